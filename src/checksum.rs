@@ -19,25 +19,21 @@ impl Checksum {
     pub const EMPTY: Self = Self(0x811c_9dc5);
 
     /// Adds one word.
-    #[must_use]
     pub const fn word(self, word: u32) -> Self {
         Self((self.0 ^ word).wrapping_mul(16_777_619))
     }
 
     /// Adds one number, with all of its bits.
-    #[must_use]
     pub const fn number(self, number: f32) -> Self {
         self.word(number.to_bits())
     }
 
     /// Adds several numbers.
-    #[must_use]
     pub(crate) fn numbers(self, numbers: impl IntoIterator<Item = f32>) -> Self {
         numbers.into_iter().fold(self, Self::number)
     }
 
     /// Value of the checksum.
-    #[must_use]
     pub const fn value(self) -> u32 {
         self.0
     }

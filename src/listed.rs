@@ -23,7 +23,6 @@ macro_rules! listed {
     (@word $kind:ident, $(#[$of_word:meta])* $word:ident; $( $name:ident $text:literal, )*) => {
         impl $kind {
             $(#[$of_word])*
-            #[must_use]
             pub const fn $word(self) -> &'static str {
                 match self { $( Self::$name => $text, )* }
             }

@@ -46,13 +46,11 @@ pub trait Real: RealField + Copy {
 }
 
 /// Sine and cosine of an angle in rad.
-#[must_use]
 pub fn sin_cos<T: Real>(angle: T) -> (T, T) {
     angle.door_sin_cos()
 }
 
 /// Sine and cosine of an angle in units of 2^-32 turns, wrong by up to 1.2e-7 each: no reduction needed.
-#[must_use]
 #[inline(always)]
 pub(crate) fn sin_cos_of_turns(units: u32) -> (f32, f32) {
     const RADIAN_PER_UNIT: f32 = core::f32::consts::TAU / 4_294_967_296.0;
@@ -65,43 +63,36 @@ pub(crate) fn sin_cos_of_turns(units: u32) -> (f32, f32) {
 }
 
 /// Square root; NaN for negative numbers.
-#[must_use]
 pub fn sqrt<T: Real>(value: T) -> T {
     value.door_sqrt()
 }
 
 /// e to the power of `value`.
-#[must_use]
 pub fn exp<T: Real>(value: T) -> T {
     value.door_exp()
 }
 
 /// Natural logarithm; NaN for negative numbers.
-#[must_use]
 pub fn ln<T: Real>(value: T) -> T {
     value.door_ln()
 }
 
 /// Angle of the point (`x`, `y`) from the x axis, rad, in -pi..=pi.
-#[must_use]
 pub fn atan2<T: Real>(y: T, x: T) -> T {
     y.door_atan2(x)
 }
 
 /// Magnitude; one instruction on the device.
-#[must_use]
 pub fn abs<T: Real>(value: T) -> T {
     value.door_abs()
 }
 
 /// The smaller of two numbers; if one is NaN, the other.
-#[must_use]
 pub fn min<T: Real>(one: T, other: T) -> T {
     if other < one || is_nan(one) { other } else { one }
 }
 
 /// The larger of two numbers; if one is NaN, the other.
-#[must_use]
 pub fn max<T: Real>(one: T, other: T) -> T {
     if other > one || is_nan(one) { other } else { one }
 }
@@ -111,7 +102,6 @@ fn is_nan<T: Real>(value: T) -> bool {
 }
 
 /// Limits `value` to `low..=high`; NaN gives `low`.
-#[must_use]
 pub fn clamp<T: Real>(value: T, low: T, high: T) -> T {
     if value > high {
         high
@@ -123,7 +113,6 @@ pub fn clamp<T: Real>(value: T, low: T, high: T) -> T {
 }
 
 /// Sign of a number: -1, 0 or 1; 0 for NaN.
-#[must_use]
 pub fn sign<T: Real>(value: T) -> T {
     if value > T::zero() {
         T::one()
@@ -135,7 +124,6 @@ pub fn sign<T: Real>(value: T) -> T {
 }
 
 /// True if neither NaN nor infinite.
-#[must_use]
 pub fn is_finite<T: Real>(value: T) -> bool {
     abs(value) <= T::LARGEST
 }

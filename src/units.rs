@@ -16,13 +16,10 @@ macro_rules! unit {
             /// Zero.
             pub const ZERO: Self = Self(0.0);
             /// Returns the magnitude.
-            #[must_use]
             pub const fn abs(self) -> Self { Self(self.0.abs()) }
             /// True if neither NaN nor infinite.
-            #[must_use]
             pub const fn is_finite(self) -> bool { self.0.is_finite() }
             /// Limits to `-bound..=bound`; zero if the value or the bound is NaN.
-            #[must_use]
             pub fn limited(self, bound: Self) -> Self {
                 let raised = if self.0 < -bound.0 { -bound.0 } else { self.0 };
                 if raised > bound.0 {

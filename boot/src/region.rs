@@ -43,7 +43,6 @@ impl Region {
         [Self::BOOTLOADER, Self::STATE, Self::PARAMETERS, Self::LOG, Self::IMAGE, Self::NEW_IMAGE];
 
     /// Size in bytes.
-    #[must_use]
     pub const fn bytes(&self) -> u32 {
         self.sectors * self.sector_bytes
     }

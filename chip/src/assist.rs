@@ -60,7 +60,6 @@ pub struct AssistComparison {
 
 impl AssistComparison {
     /// Whether torques agree and the phases are the same.
-    #[must_use]
     pub fn is_good(&self) -> bool {
         let agrees = |joint: usize| {
             (self.image_rms_nm[joint] / self.host_rms_nm[joint] - 1.0).abs() <= LARGEST_DIFFERENCE

@@ -120,7 +120,6 @@ pub struct LostTriggers {
 
 impl LostTriggers {
     /// Loses `lost` triggers in a row, lets `come` pass, and so on, until `left` were lost.
-    #[must_use]
     pub const fn new(lost: u32, come: u32, left: u32) -> Self {
         Self { lost, come, left, phase: 0 }
     }
@@ -184,7 +183,6 @@ pub struct Chip {
 
 impl Chip {
     /// A chip after power-on, on a board with this plant.
-    #[must_use]
     pub fn new(plant: Plant, seed: u64) -> Self {
         let kinds = [Kind::Advanced, Kind::Advanced, Kind::Wide, Kind::General, Kind::General, Kind::Wide];
         let mut noise = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -733,7 +731,6 @@ impl Chip {
     }
 
     /// Conversions that were overwritten before they were read.
-    #[must_use]
     pub fn lost_conversions(&self) -> u64 {
         self.adcs.iter().flat_map(|adc| adc.lost).sum()
     }

@@ -184,7 +184,6 @@ fn factor(text: &str) -> Result<f64, String> {
 }
 
 /// Runs the program.
-#[must_use]
 pub fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Run { common, steps, records, seconds } => run(&common, &steps, records.as_deref(), seconds),

@@ -74,12 +74,10 @@ pub struct Row {
 
 impl Row {
     /// Whether model and promise agree, or may differ.
-    #[must_use]
     pub const fn is_sound(&self) -> bool {
         self.agrees || self.reason.is_some()
     }
 
-    #[must_use]
     pub fn verdict(&self) -> &'static str {
         if self.agrees { "equal" } else { self.reason.unwrap_or("DIFFERS") }
     }

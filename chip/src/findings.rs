@@ -45,7 +45,6 @@ pub struct Finding {
 
 impl Finding {
     /// Reason why a finding is harmless, if known.
-    #[must_use]
     pub fn known(&self) -> Option<&'static str> {
         let is_same = |(what, register, function, _): &(&str, &str, &str, &str)| {
             (*what, *register) == (self.what, self.register.as_str()) && self.function.contains(function)
@@ -81,18 +80,15 @@ impl Findings {
     }
 
     /// Whether a rule was violated so far.
-    #[must_use]
     pub fn has(&self, what: &str) -> bool {
         self.found.keys().any(|(_, found, _)| *found == what)
     }
 
     /// Number of distinct findings.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.found.len()
     }
 
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
     }

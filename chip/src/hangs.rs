@@ -47,7 +47,6 @@ pub struct HangReport {
 
 impl HangReport {
     /// Whether the board was reset in time with its bridges off, or continued if only the thread hung.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         if self.level == "thread" {
             return self.reset_ms.is_none() && self.released_ms.is_none() && !self.on_again;

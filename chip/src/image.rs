@@ -121,21 +121,18 @@ impl Image {
     }
 
     /// An image without names, from its first bytes.
-    #[must_use]
     pub fn from_bytes(bytes: &[u8]) -> Self {
         let mut flash = vec![0xFF; FLASH_BYTES as usize];
         flash[..bytes.len()].copy_from_slice(bytes);
         Self { elf: Vec::new(), flash, functions: Vec::new(), objects: Vec::new() }
     }
 
-    #[must_use]
     pub fn word(&self, address: u32) -> Option<u32> {
         let at = address.checked_sub(FLASH)? as usize;
         self.flash.get(at..at + 4).map(|bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
     }
 
     /// Name of the function at an address, or the address.
-    #[must_use]
     pub fn function(&self, address: u32) -> String {
         let after = self.functions.partition_point(|symbol| symbol.address <= address);
         match after.checked_sub(1).and_then(|index| self.functions.get(index)) {
@@ -145,14 +142,12 @@ impl Image {
     }
 
     /// Address of a symbol by its exact name.
-    #[must_use]
     pub fn address(&self, name: &str) -> Option<u32> {
         let mut all = self.objects.iter().chain(&self.functions);
         all.find(|symbol| symbol.name == name).map(|symbol| symbol.address)
     }
 
     /// Address of the function whose name contains `within` and ends with `name`.
-    #[must_use]
     pub fn function_in(&self, within: &str, name: &str) -> Option<u32> {
         let is_meant = |symbol: &&Symbol| symbol.path().contains(within) && symbol.path().ends_with(name);
         self.functions.iter().find(is_meant).map(|symbol| symbol.address)
@@ -169,7 +164,6 @@ impl Image {
     }
 
     /// Addresses of all halfwords with a value, which may be instructions.
-    #[must_use]
     pub fn find(&self, halfword: u16) -> Vec<u32> {
         let bytes = halfword.to_le_bytes();
         let halves = self.flash.chunks_exact(2).enumerate();
@@ -177,7 +171,6 @@ impl Image {
     }
 
     /// Number of instructions in a block of code.
-    #[must_use]
     pub fn instructions(&self, address: u32, size: u32) -> u32 {
         let at = address.wrapping_sub(FLASH) as usize;
         let (mut offset, mut count) = (0, 0);

@@ -66,7 +66,6 @@ pub struct Load {
 }
 
 impl Load {
-    #[must_use]
     pub fn new() -> Self {
         Self { uses: vec![Use::default(); EXCEPTIONS], ..Self::default() }
     }
@@ -122,25 +121,21 @@ impl Load {
     }
 
     /// Use by an exception since the last [`Load::clear`].
-    #[must_use]
     pub fn usage(&self, exception: u8) -> Use {
         self.uses[usize::from(exception)]
     }
 
     /// Share of the time since the last [`Load::clear`] that an exception used.
-    #[must_use]
     pub fn share(&self, exception: u8, now: Ticks) -> f64 {
         self.usage(exception).ticks as f64 / (now - self.cleared).max(1) as f64
     }
 
     /// Time since the last [`Load::clear`].
-    #[must_use]
     pub fn measured(&self, now: Ticks) -> Ticks {
         (now - self.cleared).max(1)
     }
 
     /// Share of the time since the last [`Load::clear`] in which the processor was awake.
-    #[must_use]
     pub fn awake(&self, now: Ticks) -> f64 {
         1.0 - self.asleep as f64 / (now - self.cleared).max(1) as f64
     }

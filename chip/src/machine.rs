@@ -146,7 +146,6 @@ impl Machine {
         Ok(machine)
     }
 
-    #[must_use]
     pub fn chip(&self) -> &Chip {
         &self.core.get_data().chip
     }
@@ -155,7 +154,6 @@ impl Machine {
         &mut self.core.get_data_mut().chip
     }
 
-    #[must_use]
     pub fn image(&self) -> &Rc<Image> {
         &self.core.get_data().image
     }
@@ -171,7 +169,6 @@ impl Machine {
     }
 
     /// Instructions since [`Machine::begin_profile`] by exception and function, most first.
-    #[must_use]
     pub fn profile(&self) -> Vec<(u8, String, u64)> {
         let state = self.core.get_data();
         let mut functions: HashMap<(u8, String), u64> = HashMap::new();
@@ -190,7 +187,6 @@ impl Machine {
     }
 
     /// Calls since [`Machine::watch`], in its order.
-    #[must_use]
     pub fn calls(&self) -> Vec<Calls> {
         self.core.get_data().watched.iter().map(|watched| watched.calls).collect()
     }
@@ -215,7 +211,6 @@ impl Machine {
         }
     }
 
-    #[must_use]
     pub fn is_asleep(&self) -> bool {
         self.core.get_data().asleep
     }

@@ -33,7 +33,6 @@ pub struct Nvic {
 
 impl Nvic {
     /// State after a reset.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             enabled: 0xFFFF,
@@ -44,14 +43,12 @@ impl Nvic {
     }
 
     /// Exceptions that are enabled and pending.
-    #[must_use]
     #[inline]
     pub fn ready(&self) -> u128 {
         self.enabled & self.pending
     }
 
     /// Whether an enabled interrupt is pending, which ends a sleep even if it is masked.
-    #[must_use]
     pub fn is_pending(&self, exception: u8) -> bool {
         self.pending >> exception & 1 == 1
     }
@@ -84,7 +81,6 @@ impl Nvic {
     /// Interrupt control and state register (B3.2.4): active and first pending exception, pending system
     /// exceptions. Known limit, also QEMU's: the base priority does not hide the pending exception, as on
     /// silicon.
-    #[must_use]
     pub fn state(&self) -> u32 {
         let pending = |exception: u8| u32::from(self.is_pending(exception));
         u32::from(self.current())
@@ -97,7 +93,6 @@ impl Nvic {
     }
 
     /// Priority of an exception; a smaller number preempts.
-    #[must_use]
     pub fn priority(&self, exception: u8) -> i16 {
         match exception {
             1 => -3,
@@ -113,13 +108,11 @@ impl Nvic {
     }
 
     /// Priority at which the processor runs, without masks.
-    #[must_use]
     pub fn running(&self) -> i16 {
         self.active.iter().map(|&exception| self.group_of(self.priority(exception))).min().unwrap_or(THREAD)
     }
 
     /// Pending exception that preempts code at this priority.
-    #[must_use]
     pub fn preempting(&self, running: i16) -> Option<u8> {
         let mut ready = self.ready();
         let mut best: Option<(i16, u8)> = None;
@@ -135,7 +128,6 @@ impl Nvic {
     }
 
     /// Whether an exception would preempt code at this priority.
-    #[must_use]
     pub fn preempts(&self, exception: u8, running: i16) -> bool {
         self.group_of(self.priority(exception)) < running
     }
@@ -155,19 +147,16 @@ impl Nvic {
     }
 
     /// Active exception; 0 for the thread.
-    #[must_use]
     pub fn current(&self) -> u8 {
         self.active.last().copied().unwrap_or(0)
     }
 
     /// Number of active exceptions.
-    #[must_use]
     pub fn depth(&self) -> usize {
         self.active.len()
     }
 
     /// Reads a register by its offset from 0xE000_E000.
-    #[must_use]
     pub fn read(&self, offset: u32, size: usize) -> u32 {
         let word = |bits: u128, first: u32| (bits >> (16 + 8 * (offset - first))) as u32;
         match offset {

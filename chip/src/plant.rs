@@ -97,7 +97,6 @@ pub struct Reaction {
 
 impl Reaction {
     /// Begins with the bridges as they are.
-    #[must_use]
     pub fn new(plant: &Plant) -> Self {
         Self { armed: plant.axes.each_ref().map(|axis| axis.is_armed), ..Self::default() }
     }
@@ -202,7 +201,6 @@ impl Axis {
     }
 
     /// Edges of the bridge that lie within a window before an instant, the dead time included.
-    #[must_use]
     pub fn edges_within(&self, window: Ticks, before: Ticks) -> (u32, i32) {
         let dead = ticks(self.description.bridge.dead_time);
         let within =
@@ -472,31 +470,26 @@ impl Plant {
     }
 
     /// True state of the wearer, if any.
-    #[must_use]
     pub fn wearer_truth(&self) -> Option<WearerTruth> {
         self.wearer.as_ref().map(|wearer| wearer.truth(&self.state))
     }
 
     /// Whether a hand holds the leg.
-    #[must_use]
     pub const fn is_held(&self) -> bool {
         self.hand.is_some()
     }
 
     /// Joint angles, rad, anatomical.
-    #[must_use]
     pub fn position(&self) -> [f64; JOINTS] {
         core::array::from_fn(|joint| self.anatomy[joint].to_anatomical_angle(self.state.angles[joint]))
     }
 
     /// Joint rates, rad/s, anatomical.
-    #[must_use]
     pub fn velocity(&self) -> [f64; JOINTS] {
         core::array::from_fn(|joint| self.anatomy[joint].flip(self.state.rates[joint]))
     }
 
     /// Torques of the motors at the joints, mean over the last mechanical step, N m, anatomical.
-    #[must_use]
     pub fn torque(&self) -> [f64; JOINTS] {
         core::array::from_fn(|joint| {
             let axis = &self.axes[joint];
@@ -523,7 +516,6 @@ impl Plant {
 
     /// Absolute encoder on an axis' select line: at the rotor (0) or at the joint (1). The first line is the
     /// rotor's, or the joint's where the rotor has none.
-    #[must_use]
     pub fn encoder_at(&self, axis: usize, line: usize) -> Option<usize> {
         let description = &self.axes[axis].description;
         let present = [description.counter.absolute, description.joint_encoder.is_some()];
@@ -531,7 +523,6 @@ impl Plant {
     }
 
     /// Reading of that encoder at an instant, 14 bits.
-    #[must_use]
     pub fn encoder_steps(&self, axis: usize, line: usize, now: Ticks) -> Option<u16> {
         let side = self.encoder_at(axis, line)?;
         let since = seconds(now.saturating_sub(self.mechanic));
@@ -575,7 +566,6 @@ impl Plant {
     }
 
     /// Instant of the next mechanical step or edge of an index line.
-    #[must_use]
     pub fn due(&self) -> Ticks {
         let edge = self.index_edges.first().map_or(NEVER, |(at, ..)| *at);
         edge.min(self.mechanic + STEP)

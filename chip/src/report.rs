@@ -88,7 +88,6 @@ pub struct ChipReport {
 }
 
 /// Findings of a session, split into unknown and known ones.
-#[must_use]
 pub fn findings(session: &Session) -> (Vec<Finding>, Vec<(Finding, &'static str)>) {
     let image = session.machine.image();
     let all = session.chip().findings.list(|pc| image.function(pc)).into_iter();
@@ -98,7 +97,6 @@ pub fn findings(session: &Session) -> (Vec<Finding>, Vec<(Finding, &'static str)
 }
 
 /// Shares of the processor's time.
-#[must_use]
 pub fn load(session: &Session) -> LoadReport {
     let chip = session.chip();
     let share = |names: &[&str]| {
@@ -117,7 +115,6 @@ pub fn load(session: &Session) -> LoadReport {
 }
 
 /// Use of the processor by interrupt.
-#[must_use]
 pub fn interrupts(session: &Session) -> BTreeMap<&'static str, InterruptReport> {
     let chip = session.chip();
     let measured = chip.load.measured(chip.now);
@@ -153,14 +150,12 @@ fn errors(leg: &LegFile, run: &RunReport, seed: u64) -> Result<BTreeMap<String, 
 
 impl ChipReport {
     /// Returns whether the stack is at least 1.5 times its deepest use.
-    #[must_use]
     pub const fn stack_suffices(&self) -> bool {
         let [used, size] = self.stack;
         3 * used <= 2 * size
     }
 
     /// Whether every base parameter is within one sigma of the plant's.
-    #[must_use]
     pub fn agrees_with_the_plant(&self) -> bool {
         self.errors.values().all(|error| error.abs() <= 1.0)
     }

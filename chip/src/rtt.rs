@@ -71,7 +71,6 @@ impl Probe {
     }
 
     /// First record from an index on that begins with `kind` and contains all `words`.
-    #[must_use]
     pub fn find(&self, from: usize, kind: &str, words: &[&str]) -> Option<&str> {
         let fits = |line: &&(Ticks, String)| {
             line.1.split(' ').next() == Some(kind)
@@ -81,14 +80,12 @@ impl Probe {
     }
 
     /// Records as text with their times.
-    #[must_use]
     pub fn text(&self) -> String {
         self.lines.iter().map(|(at, line)| format!("{:10.4} {line}\n", seconds(*at))).collect()
     }
 }
 
 /// Value of a field of a record.
-#[must_use]
 pub fn field<'a>(line: &'a str, key: &str) -> Option<&'a str> {
     line.split(' ').find_map(|field| field.strip_prefix(key)?.strip_prefix('='))
 }

@@ -93,7 +93,6 @@ impl SweepReport {
     }
 
     /// Whether all voltages up to the documented one were seen, and none of them disturbs a conversion.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         let documented = &self.steps[..self.steps.len().min(1 + CLEAN_V as usize)];
         documented.iter().all(|step| step.conversions >= FEWEST)
@@ -113,7 +112,6 @@ pub struct Report {
 
 impl Report {
     /// Whether all of it is as documented.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         self.situations.iter().all(SamplingReport::is_sound) && self.sweep.is_sound()
     }
@@ -151,7 +149,6 @@ fn sweep(session: &mut Session, resting: &Snapshot) -> Result<SweepReport, ToolE
 impl SamplingReport {
     /// Whether every conversion began at the documented instant, without a preceding edge of the other
     /// bridge.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         let are_right =
             |times: [f64; 2], expected: f64| times.iter().all(|at| (at - expected).abs() < CLOCK_NS);

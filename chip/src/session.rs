@@ -140,7 +140,6 @@ impl Session {
         })
     }
 
-    #[must_use]
     pub fn now(&self) -> Ticks {
         self.chip().now
     }
@@ -555,7 +554,6 @@ impl Session {
     }
 
     /// Emergency codes of a node among the frames that the board has sent.
-    #[must_use]
     pub fn emergencies(&self, node: u16) -> Vec<u16> {
         let own = |(_, frame): &(Ticks, Frame)| match *frame.data() {
             [low, high, _, _, _, _, _, _] if frame.id() == 0x80 + node => {
@@ -628,7 +626,6 @@ impl Session {
         self.client().try_read(node, object).map_err(|error| error.refused(node, object))
     }
 
-    #[must_use]
     pub fn chip(&self) -> &Chip {
         self.machine.chip()
     }

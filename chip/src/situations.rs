@@ -112,7 +112,6 @@ pub fn run(session: &mut Session, profiled: bool) -> Result<Vec<Situation>, Tool
 }
 
 /// Goals that a measurement misses, in words.
-#[must_use]
 pub fn missed_goals(found: &[Situation]) -> Vec<String> {
     let mut missed = Vec::new();
     for Situation { name, load, interrupts, calls, .. } in

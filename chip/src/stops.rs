@@ -52,7 +52,6 @@ pub struct StopReport {
 
 impl StopReport {
     /// Whether every stop turned both bridges off by its own interrupt, not by a later tick.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         self.situations.iter().all(Situation::is_sound)
     }
@@ -60,7 +59,6 @@ impl StopReport {
 
 impl Situation {
     /// Whether a bridge was on at the stops, and all of them ended so.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         let is_off = self.stayed_on == 0 && self.on_again == 0;
         self.armed > 0 && is_off && self.worst_final_us <= LONGEST_US

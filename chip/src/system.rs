@@ -127,7 +127,6 @@ impl Chip {
     }
 
     /// Whether a pending interrupt wakes the processor even if it is masked (SEVONPEND).
-    #[must_use]
     pub const fn wakes_when_pending(&self) -> bool {
         self.system.control & 0x10 != 0
     }

@@ -13,17 +13,14 @@ pub const NEVER: Ticks = u64::MAX;
 pub const FULL_SPEED: Ticks = 2;
 
 /// Converts seconds to ticks, rounded; negative and not finite durations are 0.
-#[must_use]
 pub fn ticks(seconds: f64) -> Ticks {
     (seconds * TICK_HZ as f64).round() as Ticks
 }
 
-#[must_use]
 pub fn seconds(ticks: Ticks) -> f64 {
     ticks as f64 / TICK_HZ as f64
 }
 
-#[must_use]
 pub fn microseconds(ticks: Ticks) -> f64 {
     1e6 * seconds(ticks)
 }

@@ -62,12 +62,10 @@ pub struct UpdateReport {
 
 impl UpdateReport {
     /// Number of trials that did not pass.
-    #[must_use]
     pub fn failed(&self) -> usize {
         self.trials.iter().filter(|trial| !trial.passes).count()
     }
 
-    #[must_use]
     pub fn text(&self) -> String {
         let mut text = format!(
             "image {} bytes; download {:.1} s, restart with swap {:.1} s\n",

@@ -69,25 +69,21 @@ pub struct Anatomy {
 
 impl Anatomy {
     /// Conversion from a joint's direction (+1 or -1) and zero offset.
-    #[must_use]
     pub fn from_joint(joint: &JointDescription) -> Self {
         Self { direction: joint.direction, zero_offset: joint.zero_offset }
     }
 
     /// Joint angle for an anatomical angle, rad.
-    #[must_use]
     pub fn to_joint_angle(&self, anatomical: f64) -> f64 {
         self.direction * anatomical + self.zero_offset
     }
 
     /// Anatomical angle for a joint angle, rad.
-    #[must_use]
     pub fn to_anatomical_angle(&self, joint: f64) -> f64 {
         self.direction * (joint - self.zero_offset)
     }
 
     /// Converts a rate or torque, in either direction: the sign changes with `direction`.
-    #[must_use]
     pub fn flip(&self, rate_or_torque: f64) -> f64 {
         self.direction * rate_or_torque
     }

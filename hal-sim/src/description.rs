@@ -68,7 +68,6 @@ pub struct BodyDescription {
 impl BodyDescription {
     /// The body with a point mass (kg) fixed at a position (m) in its D-H frame. The inertia follows from the
     /// parallel axis theorem about the common centre of mass. A negative mass removes a point mass.
-    #[must_use]
     pub fn with_point_mass(&self, mass: f64, at: [f64; 3]) -> Self {
         let whole = self.mass + mass;
         let com: [f64; 3] =

@@ -19,7 +19,6 @@ const STIFFNESS: f64 = 10e3;
 const DAMPING: f64 = 100.0;
 
 /// Torque of both stops on a joint at this angle, with this rate.
-#[must_use]
 pub fn torque(stops: Option<[f64; 2]>, angle: f64, rate: f64) -> f64 {
     let Some([low, high]) = stops else { return 0.0 };
     if angle > high {

@@ -56,7 +56,6 @@ pub struct Flash<const BYTES: usize, const SECTORS: usize> {
 
 impl<const BYTES: usize, const SECTORS: usize> Flash<BYTES, SECTORS> {
     /// An erased flash with power.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self {
             cells: [[0xFF; BYTES]; SECTORS],
@@ -74,19 +73,16 @@ impl<const BYTES: usize, const SECTORS: usize> Flash<BYTES, SECTORS> {
     }
 
     /// Whether the power has failed.
-    #[must_use]
     pub fn is_dead(&self) -> bool {
         self.left == Some(0)
     }
 
     /// Bytes programmed or erased so far.
-    #[must_use]
     pub fn worked(&self) -> u64 {
         self.worked
     }
 
     /// Number of erasures of each sector.
-    #[must_use]
     pub fn erasures(&self) -> &[u32; SECTORS] {
         &self.erased
     }

@@ -52,7 +52,6 @@ pub(crate) struct Floor {
 
 impl Floor {
     /// A floor before contact; `foot` from the last joint, in the world frame at the reference pose.
-    #[must_use]
     pub fn new(foot: Vector3<f64>, start: f64, duration: f64) -> Self {
         Self { foot, start, duration, height: None }
     }

@@ -26,7 +26,6 @@ use crate::maths::exp;
 
 impl FrictionDescription {
     /// Level of the dry friction at a rate (rad/s), N m; the breakaway level at 0.
-    #[must_use]
     #[inline(always)]
     pub(crate) fn dry_level(&self, rate: f64) -> f64 {
         match self.stribeck {
@@ -39,7 +38,6 @@ impl FrictionDescription {
     }
 
     /// Friction and offset of a moving joint, N m. At rest the dry part is undetermined and omitted.
-    #[must_use]
     pub fn torque(&self, rate: f64) -> f64 {
         let dry = if rate == 0.0 { 0.0 } else { self.dry_level(rate) * rate.signum() };
         dry + self.viscous * rate + self.offset

@@ -26,7 +26,6 @@ pub(crate) struct Grip {
 
 impl Grip {
     /// A grip from `start` on, for `duration`, with at most `strength`.
-    #[must_use]
     pub fn new(joint: usize, strength: f64, start: f64, duration: f64) -> Self {
         Self { joint, strength, start, duration, held: None }
     }

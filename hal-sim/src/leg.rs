@@ -49,7 +49,6 @@ pub struct LegState<const N: usize> {
 
 impl<const N: usize> Leg<N> {
     /// Bodies and friction of a described leg.
-    #[must_use]
     pub fn new(description: &LegDescription<N>) -> Self {
         Self {
             mechanism: Mechanism::new(description),
@@ -59,7 +58,6 @@ impl<const N: usize> Leg<N> {
     }
 
     /// This leg with some joints mechanically blocked; their rates must be 0.
-    #[must_use]
     pub(crate) fn with_blocked(mut self, blocked: [bool; N]) -> Self {
         self.blocked = blocked;
         self
@@ -71,14 +69,12 @@ impl<const N: usize> Leg<N> {
     }
 
     /// Rigid bodies without friction.
-    #[must_use]
     pub fn mechanism(&self) -> &Mechanism<N> {
         &self.mechanism
     }
 
     /// Joint torques for a motion, friction and offset included, N m. At rest the dry friction of a joint is
     /// undetermined and omitted.
-    #[must_use]
     pub fn inverse_dynamics(
         &self,
         angles: &[f64; N],
@@ -90,7 +86,6 @@ impl<const N: usize> Leg<N> {
     }
 
     /// Accelerations under joint torques (N m), rad/s^2; exactly 0 for a joint that stays at rest.
-    #[must_use]
     pub fn forward_dynamics(&self, state: &LegState<N>, torque: &[f64; N]) -> [f64; N] {
         let dynamics = self.mechanism.dynamics(&state.angles, &state.rates);
         let coriolis = times(&dynamics.coriolis, &state.rates);

@@ -57,7 +57,6 @@ struct Pose<const N: usize> {
 
 impl<const N: usize> Mechanism<N> {
     /// Rigid bodies of a described leg.
-    #[must_use]
     pub fn new(description: &LegDescription<N>) -> Self {
         const { assert!(1 <= N && N <= 3) };
         Self { links: links_at_reference(&description.joints), gravity: Vector3::from(description.gravity) }
@@ -87,7 +86,6 @@ impl<const N: usize> Mechanism<N> {
     }
 
     /// Inertia matrix, Coriolis matrix and gravity torque at joint angles (rad) and rates (rad/s).
-    #[must_use]
     #[inline(always)]
     pub fn dynamics(&self, angles: &[f64; N], rates: &[f64; N]) -> Dynamics<N> {
         let pose = self.pose(angles);
@@ -130,7 +128,6 @@ impl<const N: usize> Mechanism<N> {
     }
 
     /// Torque of the rigid bodies and rotors for a motion, without friction: rad, rad/s, rad/s^2 to N m.
-    #[must_use]
     pub fn inverse_dynamics(
         &self,
         angles: &[f64; N],
@@ -145,7 +142,6 @@ impl<const N: usize> Mechanism<N> {
 
     /// Position of a point of the last link at joint angles (rad), and its derivative by each joint, m/rad.
     /// The point is given from the last joint in the world frame at the reference pose, m.
-    #[must_use]
     pub(crate) fn point_of_last_link(
         &self,
         angles: &[f64; N],
@@ -165,20 +161,17 @@ impl<const N: usize> Mechanism<N> {
     }
 
     /// Unit vector against gravity; zero without gravity.
-    #[must_use]
     pub(crate) fn up(&self) -> Vector3<f64> {
         self.gravity.try_normalize(0.0).map_or_else(Vector3::zeros, |down| -down)
     }
 
     /// Kinetic energy of bodies and rotors, J.
-    #[must_use]
     pub fn kinetic_energy(&self, angles: &[f64; N], rates: &[f64; N]) -> f64 {
         let momentum = times(&self.dynamics(angles, rates).inertia, rates);
         (0..N).map(|j| 0.5 * momentum[j] * rates[j]).sum()
     }
 
     /// Potential energy in gravity, J; zero where all centres of mass lie at the base's origin.
-    #[must_use]
     pub fn potential_energy(&self, angles: &[f64; N]) -> f64 {
         let pose = self.pose(angles);
         (0..N).map(|i| -self.links[i].mass * self.gravity.dot(&pose.centre[i])).sum()

@@ -33,7 +33,6 @@ pub(crate) struct Pushes {
 
 impl Pushes {
     /// Pushes from time 0 on, with a random generator of their own; none without habits.
-    #[must_use]
     pub fn new(habits: Option<PushDescription>, joints: usize, generator: Xoshiro256PlusPlus) -> Self {
         let mut pushes = Self { habits, next: None, generator };
         pushes.plan(0.0, joints);

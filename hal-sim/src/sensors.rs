@@ -32,13 +32,11 @@ pub struct Encoder {
 
 impl Encoder {
     /// Creates an encoder.
-    #[must_use]
     pub fn new(description: &EncoderDescription) -> Self {
         Self { ratio: description.ratio, counts_per_radian: description.counts / TAU }
     }
 
     /// Counts at an anatomical joint angle in rad.
-    #[must_use]
     pub fn read(&self, angle: f64) -> i32 {
         // Dropping the upper half is the wrap of a 32-bit counter.
         nearest(self.ratio * angle * self.counts_per_radian) as i32
@@ -57,7 +55,6 @@ pub(crate) struct CurrentSensor {
 
 impl CurrentSensor {
     /// A sensor by its description.
-    #[must_use]
     pub fn new(description: &CurrentSensorDescription) -> Self {
         let mut sensor = Self {
             sigma: 0.0,

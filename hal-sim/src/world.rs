@@ -82,7 +82,6 @@ pub struct World<const N: usize> {
 
 impl<const N: usize> World<N> {
     /// A leg at rest at its anatomical zero, bridges off.
-    #[must_use]
     pub fn new(description: &LegDescription<N>, seed: u64) -> Self {
         let joints = &description.joints;
         let sensor_noise = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -278,7 +277,6 @@ impl<const N: usize> World<N> {
     }
 
     /// True state now. Costs about as much as a tick.
-    #[must_use]
     pub fn truth(&self) -> Truth<N> {
         let state = &self.state;
         let mut torque = self.joint_torque(&[0.0; N]);
@@ -299,7 +297,6 @@ impl<const N: usize> World<N> {
 
     /// Torque of the motors at the joints now, N m, without noise; as in [`Truth`], at no cost. For complete
     /// drives the mean over the last servo tick.
-    #[must_use]
     pub fn motor_torque(&self) -> [f64; N] {
         core::array::from_fn(|joint| {
             let ideal = || self.drives[joint].torque();
@@ -308,26 +305,22 @@ impl<const N: usize> World<N> {
     }
 
     /// Joint angles now, rad, anatomical; as in [`Truth`], at no cost.
-    #[must_use]
     pub fn anatomical_position(&self) -> [f64; N] {
         core::array::from_fn(|joint| self.anatomy[joint].to_anatomical_angle(self.state.angles[joint]))
     }
 
     /// Joint rates now, rad/s, anatomical; as in [`Truth`], at no cost.
-    #[must_use]
     pub fn velocity(&self) -> [f64; N] {
         core::array::from_fn(|joint| self.anatomy[joint].flip(self.state.rates[joint]))
     }
 
     /// Joints held by friction now; as in [`Truth`], at no cost.
-    #[must_use]
     pub fn sticking(&self) -> [bool; N] {
         self.state.rates.map(|rate| rate == 0.0)
     }
 
     /// Motor torque, N m, for a motion (rad, rad/s, rad/s^2), with friction and offset. Dry friction of a
     /// joint at rest is undetermined and omitted.
-    #[must_use]
     pub fn inverse_dynamics(
         &self,
         position: &[f64; N],

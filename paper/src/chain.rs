@@ -72,7 +72,6 @@ pub struct ChainOptions {
 
 impl ChainOptions {
     /// The default motion at the default noise.
-    #[must_use]
     pub fn new(seed: u64, plan: Plan) -> Self {
         Self { seed, noise_percent: NOISE_PERCENT, plan, cycles: EXCITATION_CYCLES, with_series: false }
     }
@@ -137,7 +136,6 @@ pub struct Fit {
 impl Verification {
     /// Torque predicted by these base parameters against the actual one, Equation (33). Rows with the joint
     /// at rest are excluded, because friction at rest is undetermined.
-    #[must_use]
     pub fn fit(&self, model: &RowModel<f32, JOINTS, ROOM>, values: &[f32; ROOM]) -> [Fit; JOINTS] {
         core::array::from_fn(|joint| {
             let moving =
@@ -176,7 +174,6 @@ impl Verification {
 }
 
 /// Torque of a regressor row with these base parameters, N m.
-#[must_use]
 pub fn predicted(row: &[f32; ROOM], values: &[f32; ROOM]) -> f64 {
     row.iter().zip(values).map(|(&element, &value)| f64::from(element) * f64::from(value)).sum()
 }
@@ -263,7 +260,6 @@ fn smoothed(
 }
 
 /// Median: the mean of the two middle values if their number is even.
-#[must_use]
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<_> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);

@@ -87,7 +87,6 @@ impl Algorithm {
     ];
 
     /// Name in the report.
-    #[must_use]
     pub const fn id(self) -> &'static str {
         match self {
             Self::Pso => "pso",
@@ -110,7 +109,6 @@ impl Serialize for Algorithm {
 }
 
 /// Evaluations of 1,000 usual iterations of the default swarm, in the dimensions of Table IV.
-#[must_use]
 pub fn budget(dimension: usize) -> u32 {
     SWARM + ITERATIONS * (SWARM + 2 * SWARM.min(dimension as u32))
 }

@@ -158,7 +158,6 @@ pub fn runs(runs: u64, shard: Shard) -> Result<RowRuns<[Option<Trial>; 4]>, Tool
 }
 
 /// Reports these runs.
-#[must_use]
 pub fn report(runs: &[Vec<[Option<Trial>; 4]>]) -> ConvergenceReport {
     let rows = LEGS.iter().zip(runs).flat_map(|((name, unknowns), trials)| leg_rows(name, unknowns, trials));
     ConvergenceReport { motions: MOTIONS, tolerance: SHARE, precision: "f32", rows: rows.collect() }

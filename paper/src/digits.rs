@@ -3,7 +3,6 @@
 use scarab_base::number::{self, Number};
 
 /// Formats a number with four digits; a dash if unknown.
-#[must_use]
 pub fn number(value: Number) -> String {
     match value.known() {
         Some(value) if value != 0.0 && value.abs() < 1e-3 => format!("{value:.1e}"),
@@ -12,7 +11,6 @@ pub fn number(value: Number) -> String {
 }
 
 /// Formats a percentage: two decimals below ten, fewer above; a dash if unknown.
-#[must_use]
 pub fn percent(value: Option<f64>) -> String {
     match value {
         None => "-".into(),

@@ -45,7 +45,6 @@ impl Goal {
     }
 
     /// Whether the row reaches the goal.
-    #[must_use]
     pub fn is_reached_by(&self, row: &Row) -> bool {
         let within = |count: Option<u32>, most: u32| count.is_some_and(|count| count <= most);
         within(row.iterations_median, self.median)

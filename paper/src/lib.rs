@@ -86,13 +86,11 @@ impl Part {
     ];
 
     /// Whether the part has runs that shards divide.
-    #[must_use]
     pub const fn is_divided(self) -> bool {
         !matches!(self, Self::TableThree | Self::FigureFive)
     }
 
     /// Name of the part's section in a document ([`scarab_tool::view::document`]).
-    #[must_use]
     pub const fn section_name(self) -> &'static str {
         match self {
             Self::TableThree => "table-iii",
@@ -119,7 +117,6 @@ pub struct PaperOptions {
 
 impl PaperOptions {
     /// Runs of each row of a part with this default.
-    #[must_use]
     pub fn runs(&self, default: u64) -> u64 {
         self.seeds.unwrap_or(default)
     }
@@ -226,7 +223,6 @@ fn section(
 }
 
 /// JSON report: schema, rows of Table IV, and the entries of the other parts.
-#[must_use]
 pub fn report(sections: &[Section]) -> Value {
     let mut report = Map::new();
     report.insert("schema".into(), SCHEMA.into());

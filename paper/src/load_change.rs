@@ -39,7 +39,6 @@ const SECOND_STREAM: u64 = 1_000_000;
 const TOLD: f64 = 3.0;
 
 /// Load on the last link near the foot, beside the plane of the leg.
-#[must_use]
 pub fn load() -> Payload<f64> {
     Payload { joint: JOINTS - 1, mass: 5.0, position: Vector3::new(0.0, 0.40, 0.05) }
 }

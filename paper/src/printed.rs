@@ -15,7 +15,6 @@ pub struct Printed {
 
 impl Printed {
     /// Equation (30) with the sign corrected, percent; `None` for a real value of zero.
-    #[must_use]
     pub fn error(&self) -> Option<f64> {
         (self.real != 0.0).then(|| 100.0 * (self.real - self.identified).abs() / self.real.abs())
     }

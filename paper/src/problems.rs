@@ -81,19 +81,16 @@ pub const CASES: [Case; 20] = [
 
 impl Case {
     /// Least value of the function.
-    #[must_use]
     pub fn minimum(&self) -> f64 {
         self.plain().minimum()
     }
 
     /// Half the width of the box in every coordinate.
-    #[must_use]
     pub fn half_width(&self) -> f64 {
         self.plain().half_width()
     }
 
     /// Problem of one run.
-    #[must_use]
     pub fn problem<T: Real>(&self, seed: ReportSeed) -> Problem<T> {
         let motion =
             self.is_moved.then(|| Motion::random(self.dimension, self.half_width() / 2.0, seed.problem()));

@@ -32,13 +32,11 @@ pub struct RawCost<'a, const N: usize, const B: usize> {
 
 impl<'a, const N: usize, const B: usize> RawCost<'a, N, B> {
     /// Cost of `stage` within the ranges of `prior`.
-    #[must_use]
     pub fn new(model: &'a RowModel<f32, N, B>, stage: Stage<f32, B>, prior: &[LinkPrior<f32>; N]) -> Self {
         Self { model, stage, bounds: parameter_box(model, prior), coordinates: seen(model) }
     }
 
     /// Joint and parameter index of every coordinate.
-    #[must_use]
     pub fn coordinates(&self) -> &[(usize, usize)] {
         &self.coordinates
     }

@@ -37,7 +37,6 @@ pub struct PaperRuns {
 
 impl PaperRuns {
     /// Number of runs.
-    #[must_use]
     pub fn count(&self) -> usize {
         fn runs_of<T>(rows: &Option<RowRuns<T>>) -> usize {
             rows.iter().flatten().map(Vec::len).sum()

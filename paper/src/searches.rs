@@ -54,7 +54,6 @@ pub fn runs(algorithms: &[Algorithm], runs: u64, shard: Shard) -> Result<RowRuns
 }
 
 /// All rows of these searches.
-#[must_use]
 pub fn rows(algorithms: &[Algorithm], runs: &[Vec<Hits>]) -> Vec<Row> {
     let rows = |(contest, hits): (&Contest, &Vec<Hits>)| {
         let (precision, count) = if contest.is_single { ("f32", 1) } else { ("f64", TOLERANCES.len()) };

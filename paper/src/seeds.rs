@@ -23,19 +23,16 @@ pub struct ReportSeed(u64);
 
 impl ReportSeed {
     /// Seed of run number `run`; runs beyond the range get its last seed.
-    #[must_use]
     pub fn from_run(run: u64) -> Self {
         Self(REPORT.start.saturating_add(run).min(REPORT.end - 1))
     }
 
     /// Seed of the search.
-    #[must_use]
     pub fn search(self) -> u64 {
         self.0
     }
 
     /// Seed of the problem: another random sequence than the search's own.
-    #[must_use]
     pub fn problem(self) -> u64 {
         self.0 ^ 0x5eed_0000_0000_0000
     }

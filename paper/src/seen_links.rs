@@ -25,7 +25,6 @@ pub struct SeenLinks<'a, const N: usize> {
 
 impl<'a, const N: usize> SeenLinks<'a, N> {
     /// Creates the cost; `None` if every link affects torque by more than one number.
-    #[must_use]
     pub fn new<const B: usize>(
         whole: &'a FullObjective<'a, f32, N>,
         base: &BaseParameters<f64, N, B>,
@@ -53,7 +52,6 @@ impl<'a, const N: usize> SeenLinks<'a, N> {
     }
 
     /// Parameters of the leg at a position.
-    #[must_use]
     pub fn parameters(&self, position: &[f32]) -> LegParameters<f32, N> {
         self.whole.parameters(&self.all(position))
     }

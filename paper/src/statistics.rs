@@ -37,7 +37,6 @@ pub struct Row {
 
 impl Row {
     /// Row of these runs.
-    #[must_use]
     pub fn new(
         case: &Case,
         algorithm: Algorithm,
@@ -67,7 +66,6 @@ impl Row {
     }
 
     /// Whether the row belongs to this case.
-    #[must_use]
     pub fn is_of(&self, case: &Case) -> bool {
         (self.function, self.reading, self.dimension) == (case.id, case.reading, case.dimension)
     }

@@ -169,7 +169,6 @@ fn find(entry: &Entry) -> Result<Found, ToolError> {
 }
 
 /// All distinct positions of the least value.
-#[must_use]
 pub fn minimisers(problem: &TestProblem) -> Vec<[f64; 2]> {
     let near = |one: &[f64; 2], other: &[f64; 2]| {
         (one[0] - other[0]).hypot(one[1] - other[1]) < 1e-3 * problem.half_width()

@@ -68,7 +68,6 @@ pub(crate) struct Differentiator {
 
 impl Differentiator {
     /// Filter at rest at a value.
-    #[must_use]
     pub const fn at(value: f32) -> Self {
         Self { band: 0.0, low: value }
     }
@@ -101,7 +100,6 @@ pub struct LedAcceleration {
 
 impl LedAcceleration {
     /// Filter at rest at an angle, rad.
-    #[must_use]
     pub const fn at(angle: f32) -> Self {
         Self { filter: Differentiator::at(angle), last: 0.0, jerk: 0.0 }
     }

@@ -44,7 +44,6 @@ pub struct EnergyObserver<const N: usize> {
 
 impl<const N: usize> EnergyObserver<N> {
     /// Observer before the first sample.
-    #[must_use]
     pub const fn new() -> Self {
         Self { given_j: 0.0, last: None }
     }
@@ -77,19 +76,16 @@ impl<const N: usize> EnergyObserver<N> {
     }
 
     /// Energy given since the wearer last gave some, J.
-    #[must_use]
     pub fn given_j(&self) -> f32 {
         self.given_j
     }
 
     /// Damping that the energy requires, N m s/rad.
-    #[must_use]
     pub(crate) fn damping(&self) -> f32 {
         STRONGEST * clamp((4.0 / BUDGET_J * self.given_j - 1.0) * (1.0 / 3.0), 0.0, 1.0)
     }
 
     /// Whether the budget is used up, or the energy is not a number.
-    #[must_use]
     pub(crate) fn is_exhausted(&self) -> bool {
         !(self.given_j < BUDGET_J)
     }

@@ -72,7 +72,6 @@ pub struct AssistLaw<const N: usize> {
 
 impl<const N: usize> AssistLaw<N> {
     /// Idle law.
-    #[must_use]
     pub const fn new() -> Self {
         Self { session: None, running: None }
     }
@@ -88,13 +87,11 @@ impl<const N: usize> AssistLaw<N> {
     }
 
     /// Energy observer of the present session.
-    #[must_use]
     pub fn energy(&self) -> Option<&EnergyObserver<N>> {
         self.running.as_ref().map(|running| &running.energy)
     }
 
     /// Assistance of a periodic motion in the present session.
-    #[must_use]
     pub fn periodic(&self) -> Option<&PeriodicAssist<N>> {
         self.running.as_ref().map(|running| &running.periodic)
     }

@@ -23,7 +23,6 @@ impl<const N: usize> Assured<N> {
 
     /// Lower bound of the friction of moving joints, N m. The sign of Coulomb friction is linear within
     /// [`FRICTION_BAND`].
-    #[must_use]
     #[inline]
     pub(crate) fn friction(&self, qd: &[f32; N]) -> [f32; N] {
         let mut torque = [0.0; N];
@@ -73,7 +72,6 @@ fn torques<const N: usize>(
 
 impl<const N: usize> CompensationModel<N> {
     /// Weight of the empty leg with the drives' offsets, N m.
-    #[must_use]
     pub(crate) fn weight(&self, q: &[f32; N]) -> [f32; N] {
         let state = JointState { q: *q, qd: [0.0; N], qdd: [0.0; N] };
         let mut torque = torques(&self.chain, &self.empty, &state, self.gravity);
@@ -84,19 +82,16 @@ impl<const N: usize> CompensationModel<N> {
     }
 
     /// Torque of the empty leg's inertia and centrifugal terms, without gravity, N m.
-    #[must_use]
     pub(crate) fn inertia(&self, state: &JointState<f32, N>) -> [f32; N] {
         torques(&self.chain, &self.empty, state, [0.0; 3])
     }
 
     /// Weight of the wearer's leg, N m; zero while unknown.
-    #[must_use]
     pub fn wearer_weight(&self, q: &[f32; N]) -> [f32; N] {
         self.wearer_torque(&JointState { q: *q, qd: [0.0; N], qdd: [0.0; N] })
     }
 
     /// Torque that moves the wearer's leg alone, N m; zero while unknown.
-    #[must_use]
     pub(crate) fn wearer_torque(&self, state: &JointState<f32, N>) -> [f32; N] {
         match &self.wearer {
             Some(wearer) => torques(&self.chain, wearer, state, self.gravity),
@@ -106,7 +101,6 @@ impl<const N: usize> CompensationModel<N> {
 
     /// Torque that moves the wearer's leg and a share of the empty leg's inertia, less the carried share of
     /// the wearer's weight, N m: that of a wearer in a transparent leg.
-    #[must_use]
     pub(crate) fn wearer_needs(
         &self,
         state: &JointState<f32, N>,
@@ -126,14 +120,12 @@ impl<const N: usize> CompensationModel<N> {
     }
 
     /// Share of the empty leg's mass matrix, kg m^2.
-    #[must_use]
     pub fn mass_matrix(&self, q: &[f32; N], share: f32) -> [[f32; N]; N] {
         let matrix = mass_matrix(&self.chain, &self.empty, q);
         core::array::from_fn(|row| core::array::from_fn(|column| share * matrix[(row, column)]))
     }
 
     /// Kinetic energy of the empty leg, J.
-    #[must_use]
     pub(crate) fn kinetic_energy(&self, q: &[f32; N], qd: &[f32; N]) -> f32 {
         let matrix = mass_matrix(&self.chain, &self.empty, q);
         let mut energy = 0.0;

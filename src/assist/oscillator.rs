@@ -140,7 +140,6 @@ pub struct Oscillator<const N: usize> {
 
 impl<const N: usize> Oscillator<N> {
     /// Oscillators without a motion.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             phase: 0.0,
@@ -210,25 +209,21 @@ impl<const N: usize> Oscillator<N> {
 
     /// Predicted share of the motion's mean square over about one cycle, at most 1; small motions count as
     /// not predicted.
-    #[must_use]
     pub(crate) fn predicted_share(&self) -> f32 {
         1.0 - (self.error + EPSILON * 0.1) / (self.motion + EPSILON * 0.1)
     }
 
     /// Frequency, Hz.
-    #[must_use]
     pub fn hertz(&self) -> f32 {
         self.frequency / TAU
     }
 
     /// Phase, rad, 0..2 pi.
-    #[must_use]
     pub fn phase(&self) -> f32 {
         self.phase
     }
 
     /// Motion predicted for `ahead` s after the last sample: rad, rad/s, rad/s^2.
-    #[must_use]
     pub(crate) fn predict(&self, ahead: f32) -> JointState<f32, N> {
         let multiples = multiples(self.phase + self.frequency * ahead);
         let mut state = JointState { q: [0.0; N], qd: [0.0; N], qdd: [0.0; N] };

@@ -53,7 +53,6 @@ pub struct PeriodicAssist<const N: usize> {
 
 impl<const N: usize> PeriodicAssist<N> {
     /// Assistance before the first sample.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             oscillator: Oscillator::new(),
@@ -69,13 +68,11 @@ impl<const N: usize> PeriodicAssist<N> {
     }
 
     /// Oscillators.
-    #[must_use]
     pub fn oscillator(&self) -> &Oscillator<N> {
         &self.oscillator
     }
 
     /// Opening of the gate, 0..1.
-    #[must_use]
     pub fn gate(&self) -> f32 {
         self.gate
     }

@@ -26,7 +26,6 @@ impl AssistShares {
     pub const GRAVITY_ONLY: Self = Self { friction: 0.0, inertia: 0.0, weight: 0.0, periodic: 0.0 };
 
     /// Whether every share is finite and in its range.
-    #[must_use]
     pub(crate) fn are_permitted(&self) -> bool {
         let Self { friction, inertia, weight, periodic } = *self;
         [friction, inertia, weight, periodic].into_iter().all(is_finite)
@@ -37,7 +36,6 @@ impl AssistShares {
     }
 
     /// Whether the model of the worn leg is needed too.
-    #[must_use]
     pub(crate) fn need_worn_model(&self) -> bool {
         self.weight != 0.0 || self.periodic != 0.0
     }

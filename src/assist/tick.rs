@@ -91,7 +91,6 @@ pub(crate) struct AssistTick<const N: usize> {
 impl<const N: usize> AssistTick<N> {
     /// Begins a session at rest at these angles (rad), with the torque that holds the leg (N m), a share of
     /// the friction and its bounds. `cap_nm` are the joints' torque caps.
-    #[must_use]
     pub(crate) fn begin(
         number: u32,
         (friction_share, assured): (f32, Assured<N>),
@@ -155,19 +154,16 @@ impl<const N: usize> AssistTick<N> {
     }
 
     /// Reason of a session that is ending.
-    #[must_use]
     pub(crate) const fn end(&self) -> Option<AssistEnd> {
         self.end
     }
 
     /// Whether the session has faded out.
-    #[must_use]
     pub(crate) fn has_ended(&self) -> bool {
         self.end.is_some() && !(self.share > 0.0)
     }
 
     /// Whether the whole assistance acts.
-    #[must_use]
     pub(crate) fn is_complete(&self) -> bool {
         self.share >= 1.0
     }

@@ -131,13 +131,11 @@ impl Crash {
     }
 
     /// Name used in records.
-    #[must_use]
     pub fn cause(&self) -> &'static str {
         CrashCause::ALL.get(self.cause.wrapping_sub(1) as usize).map_or("unknown", |cause| cause.name())
     }
 
     /// End of a panic's file name, or `-`.
-    #[must_use]
     pub fn file(&self) -> &str {
         let name = self.name.get(..self.length as usize).unwrap_or(&[]);
         let name = core::str::from_utf8(name).unwrap_or("");

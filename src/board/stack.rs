@@ -22,13 +22,11 @@ fn ends() -> (*mut u32, *mut u32) {
 }
 
 /// Address of the stack's lowest word.
-#[must_use]
 pub fn bottom() -> u32 {
     ends().0 as u32
 }
 
 /// Word of the stack; `None` for addresses outside it.
-#[must_use]
 pub fn word(address: u32) -> Option<u32> {
     let (bottom, top) = ends();
     let inside = (bottom as u32..top as u32).contains(&address) && address.is_multiple_of(4);
@@ -37,7 +35,6 @@ pub fn word(address: u32) -> Option<u32> {
 }
 
 /// Size of the stack in bytes.
-#[must_use]
 pub fn bytes() -> u32 {
     let (bottom, top) = ends();
     (top as usize - bottom as usize) as u32
@@ -64,7 +61,6 @@ pub fn prepare() {
 }
 
 /// Deepest use so far, bytes.
-#[must_use]
 pub fn used() -> u32 {
     let (bottom, top) = ends();
     let words = (top as usize - bottom as usize) / 4;

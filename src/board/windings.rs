@@ -33,7 +33,6 @@ pub fn store(celsius: [f32; 2]) {
 
 /// Temperatures before the start, degrees Celsius; `None` if the checksum is wrong. For the start, before the
 /// housekeeping runs.
-#[must_use]
 pub fn stored() -> Option<[f32; 2]> {
     let address = (&raw mut STORED).cast::<u32>();
     // SAFETY: as above; any bit pattern is a valid word. The read is volatile because the content was written

@@ -50,7 +50,6 @@ pub enum Abort {
 
 impl Abort {
     /// Abort code as transmitted.
-    #[must_use]
     pub const fn code(self) -> u32 {
         self as u32
     }

@@ -30,7 +30,6 @@ listed! {
 
 impl CommissioningStep {
     /// Returns the step with this number.
-    #[must_use]
     pub(crate) fn from_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|step| *step as u32 == number)
     }
@@ -92,7 +91,6 @@ pub(crate) struct StepReport {
 
 impl StepReport {
     /// Report without a refused axis.
-    #[must_use]
     pub const fn new(result: StepResult) -> Self {
         Self { result: result as u8, axis: 0, reason: 0, detail: 0 }
     }

@@ -36,7 +36,6 @@ pub struct Identity {
 
 impl Identity {
     /// Identity of this firmware. The vendor-ID is 0: CiA has assigned none.
-    #[must_use]
     pub const fn scarab(serial: u32, hardware: &'static str) -> Self {
         Self {
             vendor: 0,
@@ -49,7 +48,6 @@ impl Identity {
     }
 
     /// Serial number of a board by its processor's 96-bit number: a CRC, so that boards of one wafer differ.
-    #[must_use]
     pub const fn serial(unique: [u32; 3]) -> u32 {
         let [[a, b, c, d], [e, f, g, h], [i, j, k, l]] =
             [unique[0].to_le_bytes(), unique[1].to_le_bytes(), unique[2].to_le_bytes()];
@@ -57,7 +55,6 @@ impl Identity {
     }
 
     /// Identity of a joint's node. The nodes of a board differ in the product code only.
-    #[must_use]
     pub const fn for_joint(self, joint: usize) -> Self {
         Self { product: self.product + joint as u32, ..self }
     }
@@ -88,7 +85,6 @@ pub(crate) struct Communication {
 
 impl Communication {
     /// Creates the state after the start.
-    #[must_use]
     pub fn new(node: NodeId, identity: Identity) -> Self {
         let base = |first: u16, pdo: usize| node.on(first + 0x100 * pdo as u16);
         let receive = |pdo: usize| {

@@ -189,7 +189,6 @@ pub struct Device<const N: usize, const LOG: usize> {
 
 impl<const N: usize, const LOG: usize> Device<N, LOG> {
     /// Creates nodes with these node-IDs and without stored parameters. No boot-up message has been sent.
-    #[must_use]
     pub fn new(
         own: [NodeId; N],
         identity: Identity,
@@ -269,7 +268,6 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Whether the frame is an emergency or boot-up message of a node, which is sent only once.
-    #[must_use]
     pub fn reports_once(&self, frame: &Frame) -> bool {
         self.nodes.iter().any(|node| node.reports_once(frame))
     }
@@ -445,19 +443,16 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Bandwidths of each joint's loops that a host has set.
-    #[must_use]
     pub(crate) fn bandwidths(&self) -> [LoopBandwidths; N] {
         self.axes.each_ref().map(Axis::bandwidths)
     }
 
     /// Whether a host controls the drive. The operator's contacts can then only inhibit it.
-    #[must_use]
     pub(crate) const fn is_hosted(&self) -> bool {
         self.hosted
     }
 
     /// Whether a host that does not control the drive has stopped it since the update before.
-    #[must_use]
     pub(crate) const fn is_stopped(&self) -> bool {
         self.stopped
     }
@@ -496,7 +491,6 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Returns the number of models accepted and stored on this board (2100:7).
-    #[must_use]
     pub(crate) const fn generation(&self) -> u32 {
         self.leg.generation
     }
@@ -507,13 +501,11 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Returns the seed of the next identification's random numbers (2100:5, 6).
-    #[must_use]
     pub const fn seed(&self) -> u64 {
         self.leg.seed
     }
 
     /// Returns the nodes.
-    #[must_use]
     pub const fn nodes(&self) -> &[Node; N] {
         &self.nodes
     }

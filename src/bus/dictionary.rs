@@ -18,7 +18,6 @@ pub struct Object {
 
 impl Object {
     /// Creates an address.
-    #[must_use]
     pub const fn at(index: u16, sub: u8) -> Self {
         Self { index, sub }
     }
@@ -50,7 +49,6 @@ pub enum Type {
 
 impl Type {
     /// Size of a number in bytes; `None` if the length varies.
-    #[must_use]
     pub const fn size(self) -> Option<u8> {
         match self {
             Self::I8 | Self::U8 => Some(1),
@@ -112,7 +110,6 @@ pub struct Row {
 
 impl Row {
     /// Returns whether the row contains the object.
-    #[must_use]
     pub const fn holds(&self, object: Object) -> bool {
         object.index.wrapping_sub(self.index) < self.indices as u16
             && object.sub.wrapping_sub(self.sub) < self.subs

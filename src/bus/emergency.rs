@@ -70,14 +70,12 @@ pub(crate) struct ErrorReport {
 
 impl ErrorReport {
     /// Creates a report without information.
-    #[must_use]
     pub(crate) const fn code(code: u16) -> Self {
         Self { code, information: [0; 5] }
     }
 
     /// Error register: bit 0 always; 1 current, 2 voltage, 3 temperature, 4 communication, 5 device profile,
     /// 7 manufacturer-specific.
-    #[must_use]
     pub(crate) const fn register(&self) -> u8 {
         1 | match self.code >> 8 {
             0x20..=0x2F => 1 << 1,
@@ -109,7 +107,6 @@ pub(crate) struct Emergency {
 
 impl Emergency {
     /// Creates the state without errors; messages are sent with this COB-ID.
-    #[must_use]
     pub const fn new(identifier: u32) -> Self {
         Self {
             active: [None; SOURCES],
@@ -168,7 +165,6 @@ impl Emergency {
     }
 
     /// Returns object 1001.
-    #[must_use]
     pub(crate) fn register(&self) -> u8 {
         self.active.iter().flatten().fold(0, |register, error| register | error.register())
     }

@@ -41,7 +41,6 @@ impl Consumer {
     }
 
     /// Returns object 1016.
-    #[must_use]
     pub(crate) const fn setting(self) -> u32 {
         self.setting
     }

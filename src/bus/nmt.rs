@@ -29,7 +29,6 @@ pub enum NmtState {
 
 impl NmtState {
     /// Whether SDO is served.
-    #[must_use]
     pub(crate) const fn serves(self) -> bool {
         matches!(self, Self::Operational | Self::PreOperational)
     }
@@ -54,7 +53,6 @@ pub enum Reset {
 }
 
 /// Decodes an NMT command; `None` if it is invalid or addressed to another node.
-#[must_use]
 pub fn command(data: &[u8], node: u8) -> Option<Command> {
     let &[command, target] = data else { return None };
     if target != 0 && target != node {

@@ -86,7 +86,6 @@ pub struct Node {
 
 impl Node {
     /// Creates a node that has not sent its boot-up message.
-    #[must_use]
     pub fn new(node: NodeId, identity: Identity) -> Self {
         Self {
             communication: Communication::new(node, identity),
@@ -98,7 +97,6 @@ impl Node {
     }
 
     /// Returns the node-ID.
-    #[must_use]
     pub const fn id(&self) -> NodeId {
         self.communication.node
     }
@@ -108,7 +106,6 @@ impl Node {
     }
 
     /// Returns the NMT state.
-    #[must_use]
     pub const fn state(&self) -> NmtState {
         self.communication.state
     }

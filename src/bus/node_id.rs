@@ -6,19 +6,16 @@ pub struct NodeId(u8);
 
 impl NodeId {
     /// Creates a node-ID, or `None` outside 1 to 127.
-    #[must_use]
     pub const fn new(number: u8) -> Option<Self> {
         if matches!(number, 1..=127) { Some(Self(number)) } else { None }
     }
 
     /// Returns the number.
-    #[must_use]
     pub const fn number(self) -> u8 {
         self.0
     }
 
     /// Returns a COB-ID of the predefined connection set: function base plus node-ID.
-    #[must_use]
     pub(crate) const fn on(self, base: u16) -> u16 {
         base + self.0 as u16
     }

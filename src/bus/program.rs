@@ -46,7 +46,6 @@ listed! {
 
 impl ProgramCommand {
     /// Command with this number.
-    #[must_use]
     pub(crate) fn from_number(number: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|command| *command as u32 == number)
     }
@@ -94,19 +93,16 @@ impl ProgramStatus {
     pub const ON_TRIAL: u32 = 1 << 10;
 
     /// Whether all of these bits are set.
-    #[must_use]
     pub const fn has(self, bits: u32) -> bool {
         self.0 & bits == bits
     }
 
     /// Sets bits if `is_set`.
-    #[must_use]
     pub(crate) const fn with(self, bits: u32, is_set: bool) -> Self {
         Self(self.0 | if is_set { bits } else { 0 })
     }
 
     /// Number of the error.
-    #[must_use]
     pub const fn error(self) -> u8 {
         (self.0 >> 1 & 0x7F) as u8
     }
@@ -124,7 +120,6 @@ pub(crate) struct ProgramObjects {
 
 impl ProgramObjects {
     /// Objects of an image with this check sum.
-    #[must_use]
     pub const fn new(checksum: u32) -> Self {
         Self { status: ProgramStatus(0), checksum, asked: None, bytes: Deque::new() }
     }

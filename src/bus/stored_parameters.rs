@@ -33,7 +33,6 @@ impl StoredNode {
     pub const NOTHING: Self = Self { bytes: [0; LONGEST], length: 0 };
 
     /// Copies `bytes`; those beyond [`LONGEST`] are discarded.
-    #[must_use]
     pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
         let mut stored = Self::NOTHING;
         for (to, from) in stored.bytes.iter_mut().zip(bytes) {
@@ -44,7 +43,6 @@ impl StoredNode {
     }
 
     /// Returns the encoded bytes.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.length).unwrap_or_default()
     }
@@ -96,13 +94,11 @@ fn number(bytes: &[u8], object: Object) -> Option<u32> {
 }
 
 /// Returns the stored node-ID (2001), if there is one.
-#[must_use]
 pub(crate) fn stored_node_id(bytes: &[u8]) -> Option<NodeId> {
     number(bytes, NODE_ID).and_then(|number| NodeId::new(number as u8))
 }
 
 /// Returns the stored bit rate (2002) in kbit/s, if there is one.
-#[must_use]
 pub(crate) fn stored_bit_rate(bytes: &[u8]) -> Option<u16> {
     number(bytes, BIT_RATE).map(|rate| rate as u16)
 }

@@ -10,7 +10,6 @@ pub struct Frame {
 
 impl Frame {
     /// A data frame. Longer `data` is cut to eight bytes, `id` to its lowest eleven bits.
-    #[must_use]
     pub fn new(id: u16, data: &[u8]) -> Self {
         let mut bytes = [0; 8];
         let mut length = 0;
@@ -22,19 +21,16 @@ impl Frame {
     }
 
     /// Identifier, 11 bits.
-    #[must_use]
     pub const fn id(&self) -> u16 {
         self.id
     }
 
     /// Data bytes.
-    #[must_use]
     pub fn data(&self) -> &[u8] {
         self.data.get(..usize::from(self.length)).unwrap_or(&self.data)
     }
 
     /// Data bytes of a frame that has all eight.
-    #[must_use]
     pub fn full(&self) -> Option<[u8; 8]> {
         (self.length == 8).then_some(self.data)
     }
@@ -42,7 +38,6 @@ impl Frame {
     /// Fewest and most bits on the wire, including the three of the intermission: 47 and 8 for each
     /// byte. At most a stuff bit is added after every four of the 34 bits, and 8 for each byte, between
     /// start and checksum.
-    #[must_use]
     pub const fn bits(&self) -> [u32; 2] {
         let data = 8 * self.length as u32;
         [47 + data, 47 + data + (33 + data) / 4]

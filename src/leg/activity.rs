@@ -22,21 +22,18 @@ pub enum Activity {
 
 impl Activity {
     /// Whether the leg follows the commands of a host.
-    #[must_use]
     #[inline]
     pub(crate) const fn follows_host(self) -> bool {
         matches!(self, Self::Follow)
     }
 
     /// Whether the leg identifies itself.
-    #[must_use]
     #[inline]
     pub(crate) const fn is_identifying(self) -> bool {
         matches!(self, Self::Identify(_))
     }
 
     /// Whether the leg gives torque from the identified model and holds no position.
-    #[must_use]
     #[inline]
     pub const fn assists(self) -> bool {
         matches!(self, Self::Assist(_))
@@ -98,7 +95,6 @@ pub enum Segment {
 
 impl Activity {
     /// Use of the samples taken now.
-    #[must_use]
     pub(crate) const fn segment(self) -> Option<Segment> {
         match self {
             Self::Identify(IdentifyPhase::Excite) => Some(Segment::Training),

@@ -24,7 +24,6 @@ const POSTURES: usize = 16;
 const SIGMAS: f32 = 2.0;
 
 /// Bounds of an estimate; zero for a parameter that was not measured alone.
-#[must_use]
 pub fn assured<const N: usize, const B: usize>(
     model: &RowModel<f32, N, B>,
     estimate: &Estimate<f32, B>,

@@ -44,7 +44,6 @@ pub struct ProvedMotion<const N: usize>(Periodic<N>);
 
 impl<const N: usize> ProvedMotion<N> {
     /// Returns the motion.
-    #[must_use]
     pub fn motion(&self) -> &Periodic<N> {
         &self.0
     }
@@ -63,7 +62,6 @@ pub enum LegError {
 
 impl<const N: usize, const B: usize> LegConfiguration<N, B> {
     /// Limits for every motion.
-    #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         core::array::from_fn(|joint| JointEnvelope {
             low: self.joints[joint].low,
@@ -74,7 +72,6 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
     }
 
     /// Speed and acceleration limits of the approach to a motion's start.
-    #[must_use]
     pub fn approach(&self) -> ([RadianPerSecond; N], [RadianPerSecondSquared; N]) {
         (
             self.joints.map(|joint| joint.speed * APPROACH_SHARE),

@@ -54,7 +54,6 @@ pub enum ControlRequest {
 
 impl ControlRequest {
     /// Returns whether the request commands a motion.
-    #[must_use]
     pub(crate) const fn moves(&self) -> bool {
         matches!(self, Self::Identify | Self::Track { .. } | Self::Assist(_))
     }
@@ -102,8 +101,6 @@ pub struct Control<const N: usize> {
     approach_acceleration: [RadianPerSecondSquared; N],
     models: ModelBlend<N>,
     change: Option<Change<f32, N>>,
-    /// Last explanation of the rows since the alarm.
-    cause: Option<Cause>,
     verdict: Option<Verdict>,
     assistance: Assistance<N>,
 }
@@ -134,7 +131,6 @@ impl<const N: usize> Control<N> {
             approach_acceleration,
             models: ModelBlend::new(),
             change: None,
-            cause: None,
             verdict: None,
             assistance: Assistance::new(),
         })
@@ -159,19 +155,16 @@ impl<const N: usize> Control<N> {
     }
 
     /// Activity.
-    #[must_use]
     pub fn activity(&self) -> Activity {
         self.activity
     }
 
     /// State of the drive.
-    #[must_use]
     pub fn state(&self) -> DriveState {
         self.servo.state()
     }
 
     /// Checksum over gains, scales and limits; only [`Self::set_bandwidths`] changes it.
-    #[must_use]
     pub(crate) fn checksum(&self) -> Checksum {
         self.servo.checksum()
     }
@@ -205,43 +198,36 @@ impl<const N: usize> Control<N> {
     }
 
     /// Codes of the limits that acted on each joint in the tick that returned `output`.
-    #[must_use]
     pub fn limit_codes(&self, output: &ControlOutput<N>) -> [LimitCodes; N] {
         self.servo.monitor.limit_codes(&output.servo.decision)
     }
 
     /// Torque by a joint's measured current, with the model's sign.
-    #[must_use]
     pub(crate) fn torque(&self, joint: usize, sample: &Sample<N>) -> Option<NewtonMetre> {
         Some(self.servo.scales().get(joint)?.torque(sample.joints.get(joint)?.current))
     }
 
     /// Limits of the joints.
-    #[must_use]
     pub fn limits(&self) -> &Limits<N> {
         self.servo.limits()
     }
 
     /// Verdict of the last identification.
-    #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
         self.verdict
     }
 
     /// Alarm that the model no longer fits. Cleared by a new activity or by taking an update.
-    #[must_use]
     pub fn change(&self) -> Option<&Change<f32, N>> {
         self.change.as_ref()
     }
 
     /// Whether an update is offered.
-    #[must_use]
     pub fn is_update_offered(&self) -> bool {
         self.models.is_offered()
     }
 
     /// Accepted model.
-    #[must_use]
     pub fn model(&self) -> Option<&IdentifiedModel<N>> {
         self.models.model()
     }
@@ -344,7 +330,7 @@ impl<const N: usize> Control<N> {
 
     /// Discards the findings of an earlier motion. A fade in progress continues to its end.
     fn forget_change(&mut self) {
-        (self.change, self.cause) = (None, None);
+        self.change = None;
         self.models.withdraw();
     }
 
@@ -366,7 +352,7 @@ impl<const N: usize> Control<N> {
             }
             ControlRequest::TakeUpdate => {
                 self.models.take();
-                (self.change, self.cause) = (None, None);
+                self.change = None;
             }
             ControlRequest::Assist(shares) => self.begin_assist(shares, gravity),
             ControlRequest::EndAssist => self.assistance.leave(AssistEnd::Requested),
@@ -449,7 +435,7 @@ impl<const N: usize> Control<N> {
             Finding::Changed(_) | Finding::Updated { .. }
                 if matches!(self.activity, Activity::Identify(_)) => {}
             Finding::Changed(change) => {
-                (self.change, self.cause) = (Some(change), None);
+                self.change = Some(change);
                 self.assistance.change();
             }
             Finding::Updated { cause, model, .. } => {
@@ -460,7 +446,6 @@ impl<const N: usize> Control<N> {
                 if cause == Cause::Nothing {
                     self.change = None;
                 }
-                self.cause = Some(cause);
             }
         }
         false

@@ -85,7 +85,6 @@ pub struct MotorDescription {
 
 impl MotorDescription {
     /// Joint angle of one count, rad.
-    #[must_use]
     pub(crate) fn step_rad(&self) -> f32 {
         core::f32::consts::TAU / (self.counts_per_turn as f32 * self.ratio)
     }

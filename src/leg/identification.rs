@@ -143,7 +143,6 @@ where
     }
 
     /// Returns the seed of the next search's random numbers.
-    #[must_use]
     pub const fn swarm_seed(&self) -> u64 {
         self.swarm_seed
     }
@@ -336,7 +335,6 @@ where
     }
 
     /// Estimates errors of link lengths and joint zeros from the validation motions.
-    #[must_use]
     pub(crate) fn misalignments(&self) -> Misalignments<f32> {
         self.held_out.alignment().misalignments()
     }
@@ -360,43 +358,36 @@ where
     }
 
     /// Whether a search is running and was not cancelled.
-    #[must_use]
     pub(crate) fn is_searching(&self) -> bool {
         self.work == Work::Solving
     }
 
     /// Returns the solver of the last training motion.
-    #[must_use]
     pub fn solver(&self) -> Option<&Solver<f32, N, B>> {
         self.solver.as_ref()
     }
 
     /// Returns the records of the validation motions.
-    #[must_use]
     pub fn validation(&self) -> &[Option<Record<f32, N, B>>; VALIDATION_MOTIONS] {
         &self.validation
     }
 
     /// Returns the last verdict.
-    #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
         self.verdict
     }
 
     /// Returns the monitoring of the accepted model.
-    #[must_use]
     pub fn model_monitor(&self) -> &ModelMonitor<N, B> {
         &self.model_monitor
     }
 
     /// Whether there is prior knowledge.
-    #[must_use]
     pub(crate) fn has_prior(&self) -> bool {
         self.prior.is_some()
     }
 
     /// Returns the row model.
-    #[must_use]
     pub fn model(&self) -> &RowModel<f32, N, B> {
         &self.model
     }

@@ -155,7 +155,6 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     }
 
     /// Law of the assistance.
-    #[must_use]
     pub fn law(&self) -> &AssistLaw<N> {
         &self.law
     }
@@ -182,7 +181,6 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     }
 
     /// Status of a joint for a host, after the tick that returned `output`.
-    #[must_use]
     pub fn joint_status(&self, joint: usize, output: &ControlOutput<N>) -> Option<JointStatus> {
         let torque = self.control.torque(joint, self.sample.as_ref()?)?;
         let follows = self.control.activity().follows_host();
@@ -238,13 +236,11 @@ impl<const N: usize, const B: usize, const TAPS: usize, const PENDING: usize> Le
     }
 
     /// Returns the control half.
-    #[must_use]
     pub fn control(&self) -> &Control<N> {
         &self.control
     }
 
     /// Returns the identification half.
-    #[must_use]
     pub fn identification(&self) -> &Identification<N, B, TAPS, PENDING> {
         &self.identification
     }

@@ -26,7 +26,6 @@ pub struct IdentifiedModel<const N: usize> {
 
 impl<const N: usize> IdentifiedModel<N> {
     /// Creates the model with these base parameters, of unknown uncertainty.
-    #[must_use]
     pub fn new<const B: usize>(model: &RowModel<f32, N, B>, base_values: &[f32; B]) -> Self {
         let parameters = model.base.complete(base_values, &[[0.0; PARAMETERS_PER_JOINT]; N]);
         let constant = model.drive_choice.map(|choice| choice.meaning);
@@ -35,26 +34,22 @@ impl<const N: usize> IdentifiedModel<N> {
     }
 
     /// Creates the model of an estimate, with its lower confidence bounds.
-    #[must_use]
     pub fn from_estimate<const B: usize>(model: &RowModel<f32, N, B>, estimate: &Estimate<f32, B>) -> Self {
         Self { assured: assured(model, estimate), ..Self::new(model, &estimate.values) }
     }
 
     /// This model with other confidence bounds.
-    #[must_use]
     pub fn with_assured(self, assured: Assured<N>) -> Self {
         Self { assured, ..self }
     }
 
     /// Lower confidence bounds of friction and inertia.
-    #[must_use]
     pub fn assured(&self) -> &Assured<N> {
         &self.assured
     }
 
     /// Models of an empty leg and, where known, of the same leg worn, for the assistance; `gravity` in the
     /// base frame, m/s^2.
-    #[must_use]
     pub fn compensation(&self, worn: Option<&Self>, gravity: [f32; 3]) -> CompensationModel<N> {
         let difference = |worn: &Self| {
             let mut wearer = worn.parameters;
@@ -77,7 +72,6 @@ impl<const N: usize> IdentifiedModel<N> {
     }
 
     /// Model of the leg with a known load; a negative mass removes one. The load need not be identified.
-    #[must_use]
     pub fn with_load(&self, load: &Payload<f32>) -> Self {
         let mut loaded = *self;
         load.add_to(&mut loaded.parameters);
@@ -95,13 +89,11 @@ impl<const N: usize> IdentifiedModel<N> {
     }
 
     /// Stribeck friction of each joint: a factor on its Coulomb friction.
-    #[must_use]
     pub(crate) fn stribeck(&self) -> &[Stribeck<f32>; N] {
         &self.stribeck
     }
 
     /// Meaning of the constant part of each joint's torque.
-    #[must_use]
     pub fn constant(&self) -> &[Constant; N] {
         &self.constant
     }
@@ -109,7 +101,6 @@ impl<const N: usize> IdentifiedModel<N> {
     /// Blend of two models: `share` (0..1) of the other's torque and the rest of this one's, since torque is
     /// linear in the parameters. Both must be models of one leg with equal curves and constants, like a model
     /// and its update.
-    #[must_use]
     pub(crate) fn towards(&self, other: &Self, share: f32) -> Self {
         let mut mixed = *self;
         for (from, to) in mixed.parameters.iter_mut().flatten().zip(other.parameters.iter().flatten()) {
@@ -119,7 +110,6 @@ impl<const N: usize> IdentifiedModel<N> {
     }
 
     /// Parameters that give the leg's torque. They are not those of its links.
-    #[must_use]
     pub fn equivalent_parameters(&self) -> &LegParameters<f32, N> {
         &self.parameters
     }

@@ -52,7 +52,6 @@ impl<const N: usize> TorqueModel<N> for Faded<'_, N> {
 impl<const N: usize> ModelBlend<N> {
     /// Creates the state without a model. A function and no constant, because a constant would place the
     /// whole value in flash to set two bytes of it.
-    #[must_use]
     pub fn new() -> Self {
         Self { model: None, next: Next::Nothing, wanted: false, share: 0.0 }
     }
@@ -78,14 +77,12 @@ impl<const N: usize> ModelBlend<N> {
     }
 
     /// Returns the feedforward of this tick.
-    #[must_use]
     pub(crate) fn faded<'a>(&'a self, mixed: Option<&'a IdentifiedModel<N>>) -> Option<Faded<'a, N>> {
         let model = mixed.or(self.model.as_ref())?;
         (self.share > 0.0).then_some(Faded { model, share: self.share })
     }
 
     /// Whether the model's share has not reached its target yet.
-    #[must_use]
     pub(crate) fn is_fading(&self) -> bool {
         self.model.is_some() && self.share != if self.wanted { 1.0 } else { 0.0 }
     }
@@ -118,7 +115,6 @@ impl<const N: usize> ModelBlend<N> {
     }
 
     /// Whether an update is offered.
-    #[must_use]
     pub(crate) fn is_offered(&self) -> bool {
         matches!(self.next, Next::Offered(_))
     }
@@ -139,7 +135,6 @@ impl<const N: usize> ModelBlend<N> {
     }
 
     /// Returns the model.
-    #[must_use]
     pub fn model(&self) -> Option<&IdentifiedModel<N>> {
         self.model.as_ref()
     }

@@ -43,7 +43,6 @@ pub struct ModelMonitor<const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> ModelMonitor<N, B> {
     /// Creates the state without a model.
-    #[must_use]
     pub fn new<const TAPS: usize>(low_pass: &LowPass<f32, TAPS>, settings: MonitorSettings<f32>) -> Self {
         Self {
             baseline: None,
@@ -131,25 +130,21 @@ impl<const N: usize, const B: usize> ModelMonitor<N, B> {
     }
 
     /// Returns the monitored model, if there is one.
-    #[must_use]
     pub fn baseline(&self) -> Option<&Baseline<f32, N, B>> {
         self.baseline.as_ref()
     }
 
     /// Returns the monitor, with its sums and their limit.
-    #[must_use]
     pub fn monitor(&self) -> &Monitor<f32, N> {
         &self.monitor
     }
 
     /// Returns the alarm of this motion.
-    #[must_use]
     pub fn change(&self) -> Option<&Change<f32, N>> {
         self.change.as_ref()
     }
 
     /// Returns the last result of the quick pass in this motion.
-    #[must_use]
     pub fn update(&self) -> Option<&Update<f32, N, B>> {
         self.update.as_ref()
     }

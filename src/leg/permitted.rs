@@ -5,7 +5,6 @@ use crate::motor::AxisFault;
 use crate::safety::{DriveState, FaultCode, InhibitReason, PowerRequest};
 
 /// Whether a fault may be reset: no inhibit reason is active but a flash write, which is no fault.
-#[must_use]
 pub(crate) const fn may_reset(causes: u32) -> bool {
     causes & !InhibitReason::Storing.bit() == 0
 }
@@ -14,7 +13,6 @@ pub(crate) const fn may_reset(causes: u32) -> bool {
 /// a fault where [`may_reset`] permits it.
 ///
 /// With an inhibit reason, a drive that is not off is switched off even without a request.
-#[must_use]
 pub(crate) fn permitted(
     request: Option<&ControlRequest>,
     causes: u32,
@@ -37,7 +35,6 @@ pub(crate) fn permitted(
 }
 
 /// Fault code of an axis that switched its outputs off.
-#[must_use]
 pub const fn axis_code(fault: AxisFault) -> FaultCode {
     match fault {
         AxisFault::CurrentSense => FaultCode::CurrentSense,

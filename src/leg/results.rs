@@ -65,13 +65,11 @@ where
     W: BorrowMut<MotionWindow<f32, N, B>>,
 {
     /// Base parameters to be judged; `None` before there is a solver.
-    #[must_use]
     pub(crate) fn estimate(&self) -> Option<Estimate<f32, B>> {
         Some(self.solver()?.estimate())
     }
 
     /// Result for one parameter of a joint (from 0), given [`Self::estimate`].
-    #[must_use]
     pub(crate) fn parameter(
         &self,
         estimate: &Estimate<f32, B>,
@@ -103,7 +101,6 @@ where
     }
 
     /// Result for one base parameter, given [`Self::estimate`]; `None` beyond the last.
-    #[must_use]
     pub(crate) fn base_parameter(&self, estimate: &Estimate<f32, B>, base: usize) -> Option<FoundBase> {
         let solver = self.solver()?;
         let model = self.model();
@@ -122,7 +119,6 @@ where
 
     /// Fit of one joint (from 0) for one motion, given [`Self::estimate`]. Motion 0 is the training motion,
     /// the others are the validation motions. `None` if the motion was not recorded.
-    #[must_use]
     pub(crate) fn fit(&self, estimate: &Estimate<f32, B>, motion: usize, joint: usize) -> Option<FoundFit> {
         let record = self.motion(motion)?;
         let size = record.torque.get(joint)?;
@@ -139,7 +135,6 @@ where
     }
 
     /// Record of a motion, counted as in [`Self::fit`].
-    #[must_use]
     pub(crate) fn motion(&self, motion: usize) -> Option<&Record<f32, N, B>> {
         match motion.checked_sub(1) {
             None => Some(self.solver()?.record()),

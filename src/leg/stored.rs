@@ -69,7 +69,6 @@ pub enum RestoreError {
 
 impl<const N: usize, const B: usize> LegConfiguration<N, B> {
     /// Fingerprint of this leg, which a model must carry.
-    #[must_use]
     pub fn fingerprint(&self) -> Fingerprint {
         Fingerprint::new(
             &self.model.chain,
@@ -82,7 +81,6 @@ impl<const N: usize, const B: usize> LegConfiguration<N, B> {
     }
 
     /// Converts a model identified with this configuration to plain data.
-    #[must_use]
     pub fn to_stored(&self, model: &IdentifiedModel<N>) -> StoredModel<N> {
         StoredModel {
             fingerprint: self.fingerprint(),

@@ -51,25 +51,21 @@ impl<T: Real> AnatomicalJoint<T> {
     }
 
     /// Identity: both angles are equal.
-    #[must_use]
     pub fn identity() -> Self {
         Self { direction: T::one(), zero_offset: T::zero() }
     }
 
     /// Direction, 1 or -1.
-    #[must_use]
     pub fn direction(&self) -> T {
         self.direction
     }
 
     /// Chain angle at the anatomical zero, rad.
-    #[must_use]
     pub fn zero_offset(&self) -> T {
         self.zero_offset
     }
 
     /// Converts to another precision.
-    #[must_use]
     pub fn convert<U: Real>(&self) -> AnatomicalJoint<U> {
         AnatomicalJoint {
             direction: U::from_double(self.direction.to_double()),
@@ -78,25 +74,21 @@ impl<T: Real> AnatomicalJoint<T> {
     }
 
     /// Converts an anatomical angle to the chain's, rad.
-    #[must_use]
     pub fn angle_to_chain(&self, anatomical: T) -> T {
         self.direction * anatomical + self.zero_offset
     }
 
     /// Converts a chain angle to the anatomical one, rad.
-    #[must_use]
     pub fn angle_from_chain(&self, q: T) -> T {
         self.direction * (q - self.zero_offset)
     }
 
     /// Converts an anatomical speed, acceleration or torque to the chain's.
-    #[must_use]
     pub fn to_chain(&self, anatomical: T) -> T {
         self.direction * anatomical
     }
 
     /// Converts the chain's speed, acceleration or torque to the anatomical one.
-    #[must_use]
     pub fn from_chain(&self, value: T) -> T {
         self.direction * value
     }

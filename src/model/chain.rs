@@ -88,7 +88,6 @@ impl<T: Real, const N: usize> Chain<T, N> {
     }
 
     /// Converts to another precision, each number rounded once.
-    #[must_use]
     pub fn convert<U: Real>(&self) -> Chain<U, N> {
         let convert = |value: T| U::from_double(value.to_double());
         Chain {
@@ -102,7 +101,6 @@ impl<T: Real, const N: usize> Chain<T, N> {
     }
 
     /// Distance between the axis points of the previous joint and of `joint`, m; `None` beyond the last.
-    #[must_use]
     pub(crate) fn distance_to(&self, joint: usize) -> Option<T> {
         self.placements
             .get(joint)
@@ -110,13 +108,11 @@ impl<T: Real, const N: usize> Chain<T, N> {
     }
 
     /// True if the common normal before `joint` has a nonzero length.
-    #[must_use]
     pub(crate) fn has_length(&self, joint: usize) -> bool {
         self.placements.get(joint).is_some_and(|placement| placement.a != T::zero())
     }
 
     /// Returns the chain with the length before `joint` multiplied by `factor`.
-    #[must_use]
     pub(crate) fn with_length(&self, joint: usize, factor: T) -> Self {
         let mut changed = *self;
         if let Some(placement) = changed.placements.get_mut(joint) {

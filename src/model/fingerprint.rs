@@ -44,7 +44,6 @@ pub struct Fingerprint(pub u64);
 impl Fingerprint {
     /// Computes the fingerprint. The torque constants (N m/A at the joint) are negative where the drive is
     /// mounted mirrored.
-    #[must_use]
     pub fn new<const N: usize>(
         chain: &Chain<f32, N>,
         anatomy: &[AnatomicalJoint<f32>; N],

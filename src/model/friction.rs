@@ -18,21 +18,18 @@ use crate::real::{Real, abs, exp, sign};
 
 /// Columns IA, FC, FV, OFF of a regressor at this speed (rad/s) and acceleration (rad/s2).
 #[inline]
-#[must_use]
 pub(crate) fn drive_columns<T: Real>(qd: T, qdd: T) -> [T; 4] {
     [qdd, sign(qd), qd, T::one()]
 }
 
 /// Torque of the drive at this speed (rad/s) and acceleration (rad/s2), N m.
 #[inline]
-#[must_use]
 pub(crate) fn drive_torque<T: Real>(parameters: &JointParameters<T>, qd: T, qdd: T) -> T {
     parameters[Parameter::IA.index()] * qdd + friction_torque(parameters, qd)
 }
 
 /// Coulomb and viscous friction and offset at this speed (rad/s), N m.
 #[inline]
-#[must_use]
 pub(crate) fn friction_torque<T: Real>(parameters: &JointParameters<T>, qd: T) -> T {
     parameters[Parameter::FC.index()] * sign(qd)
         + parameters[Parameter::FV.index()] * qd
@@ -54,7 +51,6 @@ pub struct Stribeck<T> {
 
 impl<T: Real> Stribeck<T> {
     /// Factor on the Coulomb column at this speed (rad/s). NaN where `velocity` and `qd` are both 0.
-    #[must_use]
     #[inline]
     pub fn factor(&self, qd: T) -> T {
         if self.excess == T::zero() {

@@ -42,7 +42,6 @@ pub struct RigidBody<T> {
 impl<T: Real> RigidBody<T> {
     /// Computes the ten parameters about the joint frame's origin. Parameters of bodies
     /// fixed to one another add up.
-    #[must_use]
     pub fn to_parameters(&self) -> InertialParameters<T> {
         let h = self.centre_of_mass * self.mass;
         let inertia = self.inertia + steiner(&self.centre_of_mass, &h);
@@ -61,7 +60,6 @@ impl<T: Real> RigidBody<T> {
     }
 
     /// Computes the body with these parameters; `None` unless the mass is finite and positive.
-    #[must_use]
     pub fn from_parameters(parameters: &InertialParameters<T>) -> Option<Self> {
         let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] = *parameters;
         if mass <= T::zero() || !is_finite(mass) {
@@ -80,7 +78,6 @@ fn steiner<T: Real>(c: &Vector3<T>, h: &Vector3<T>) -> Matrix3<T> {
 }
 
 /// Inertial part of a joint's parameters.
-#[must_use]
 pub fn inertial<T: Real>(parameters: &JointParameters<T>) -> InertialParameters<T> {
     let [xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ..] = *parameters;
     [xx, xy, xz, yy, yz, zz, hx, hy, hz, m]
@@ -88,7 +85,6 @@ pub fn inertial<T: Real>(parameters: &JointParameters<T>) -> InertialParameters<
 
 /// Joins a link's inertia and its drive to a joint's parameters. The drive: rotor inertia (kg m2), Coulomb (N
 /// m), viscous (N m s/rad), offset (N m).
-#[must_use]
 pub fn joint<T: Real>(link: &InertialParameters<T>, drive: &[T; 4]) -> JointParameters<T> {
     let [xx, xy, xz, yy, yz, zz, hx, hy, hz, m] = *link;
     let [ia, fc, fv, off] = *drive;

@@ -44,7 +44,6 @@ pub(crate) struct LogCholesky<T>(pub [T; INERTIAL_PARAMETERS]);
 
 impl<T: Real> LogCholesky<T> {
     /// Converts parameters to coordinates; `None` unless they are physically consistent.
-    #[must_use]
     pub(crate) fn from_parameters(parameters: &InertialParameters<T>) -> Option<Self> {
         let [xx, xy, xz, yy, yz, zz, hx, hy, hz, mass] = *parameters;
         if !(mass > T::zero() && parameters.iter().all(|value| is_finite(*value))) {
@@ -67,7 +66,6 @@ impl<T: Real> LogCholesky<T> {
     /// Converts coordinates to parameters: always finite and physically consistent.
     ///
     /// Each coordinate is limited to its range first; NaN counts as the lower limit.
-    #[must_use]
     pub(crate) fn parameters(&self) -> InertialParameters<T> {
         let [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] = self.0;
         let logarithm = T::from_double(LOGARITHM_LIMIT);
@@ -103,7 +101,6 @@ fn extent<T: Real>(pivot: T, whole: T) -> Option<T> {
 }
 
 /// True if a body with these parameters can exist: mass, and extent in three directions, beyond rounding.
-#[must_use]
 pub fn is_physically_consistent<T: Real>(parameters: &InertialParameters<T>) -> bool {
     LogCholesky::from_parameters(parameters).is_some()
 }

@@ -25,7 +25,6 @@ use super::parameter::{LegParameters, Parameter};
 use crate::real::Real;
 
 /// Mass matrix at the angles `q` (rad), kg m2, rotors included; symmetric to the last bit.
-#[must_use]
 pub fn mass_matrix<T: Real, const N: usize>(
     chain: &Chain<T, N>,
     parameters: &LegParameters<T, N>,

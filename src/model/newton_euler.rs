@@ -43,14 +43,12 @@ pub struct JointState<T, const N: usize> {
 
 impl<T: Real, const N: usize> JointState<T, N> {
     /// State at rest at these angles (rad).
-    #[must_use]
     pub fn at_rest(q: [T; N]) -> Self {
         Self { q, qd: [T::zero(); N], qdd: [T::zero(); N] }
     }
 }
 
 /// Torque of every joint, N m: links, rotors and friction. `gravity` in m/s2 in the base frame.
-#[must_use]
 pub fn joint_torques<T: Real, const N: usize>(
     chain: &Chain<T, N>,
     parameters: &LegParameters<T, N>,
@@ -64,7 +62,6 @@ pub fn joint_torques<T: Real, const N: usize>(
 }
 
 /// Torque of every joint for the links alone, N m: no rotor inertia, friction or offset.
-#[must_use]
 pub fn rigid_body_torques<T: Real, const N: usize>(
     chain: &Chain<T, N>,
     parameters: &LegParameters<T, N>,

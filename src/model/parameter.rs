@@ -60,19 +60,16 @@ listed! {
 
 impl Parameter {
     /// Index in [`JointParameters`], 0..14.
-    #[must_use]
     pub const fn index(self) -> usize {
         self as usize
     }
 
     /// True if no physically consistent leg has a negative value of it, regrouped or not.
-    #[must_use]
     pub const fn is_never_negative(self) -> bool {
         matches!(self, Self::ZZ | Self::M | Self::IA | Self::FC | Self::FV)
     }
 
     /// Unit, in ASCII.
-    #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
             Self::XX | Self::XY | Self::XZ | Self::YY | Self::YZ | Self::ZZ | Self::IA => "kg m2",
@@ -85,7 +82,6 @@ impl Parameter {
 }
 
 /// Converts parameters from double precision, each rounded once.
-#[must_use]
 #[cfg(test)]
 pub(crate) fn rounded<T: crate::real::Real, const N: usize>(
     parameters: &LegParameters<f64, N>,

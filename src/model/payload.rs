@@ -36,7 +36,6 @@ pub struct Payload<T> {
 
 impl<T: Real> Payload<T> {
     /// Contribution to the parameters of a leg; zero for a joint that does not exist.
-    #[must_use]
     pub fn parameters<const N: usize>(&self) -> LegParameters<T, N> {
         let mut parameters = [[T::zero(); PARAMETERS_PER_JOINT]; N];
         let body = RigidBody { mass: self.mass, centre_of_mass: self.position, inertia: Matrix3::zeros() };
@@ -49,7 +48,6 @@ impl<T: Real> Payload<T> {
     }
 
     /// Converts to another precision.
-    #[must_use]
     pub fn convert<U: Real>(&self) -> Payload<U> {
         Payload {
             joint: self.joint,

@@ -39,7 +39,6 @@ use super::parameter::{LegParameters, PARAMETERS_PER_JOINT, RegressorRow};
 use crate::real::Real;
 
 /// Regressor of one state: row i times the parameters is torque i (N m). `gravity` in m/s2 in the base frame.
-#[must_use]
 pub fn regressor<T: Real, const N: usize>(
     chain: &Chain<T, N>,
     state: &JointState<T, N>,
@@ -89,7 +88,6 @@ fn inertial_columns<T: Real>(axis: &JointAxis<T>, motion: &LinkMotion<T>) -> Ine
 
 /// Product of a regressor row and the parameters: the torque of its joint, N m.
 #[inline]
-#[must_use]
 pub(crate) fn row_torque<T: Real, const N: usize>(
     row: &RegressorRow<T, N>,
     parameters: &LegParameters<T, N>,

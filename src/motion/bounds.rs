@@ -67,7 +67,6 @@ pub struct Proof<const N: usize> {
 
 impl<const N: usize> Proof<N> {
     /// Bounds of the motion itself.
-    #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         self.envelope
     }
@@ -102,7 +101,6 @@ pub fn prove<const N: usize>(
 
 impl<const N: usize, const H: usize> Fourier<N, H> {
     /// Proven bounds of the curve at full speed; see the module's inequality.
-    #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         let points = POINTS_PER_HARMONIC * H.max(1);
         let mut lowest = [f32::INFINITY; N];

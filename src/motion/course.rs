@@ -45,37 +45,31 @@ pub(crate) struct Course {
 
 impl Course {
     /// Course at rest.
-    #[must_use]
     pub const fn at_rest(position: f32) -> Self {
         Self::moving(position, 0.0)
     }
 
     /// Course in motion.
-    #[must_use]
     pub(crate) const fn moving(position: f32, velocity: f32) -> Self {
         Self { position, lost: 0.0, velocity, acceleration: 0.0 }
     }
 
     /// Joint angle, rad.
-    #[must_use]
     pub(crate) const fn position(&self) -> f32 {
         self.position
     }
 
     /// Joint velocity, rad/s.
-    #[must_use]
     pub(crate) const fn velocity(&self) -> f32 {
         self.velocity
     }
 
     /// Joint acceleration, rad/s^2.
-    #[must_use]
     pub(crate) const fn acceleration(&self) -> f32 {
         self.acceleration
     }
 
     /// Sum of two courses.
-    #[must_use]
     pub(crate) fn plus(&self, other: &Self) -> Self {
         Self {
             position: self.position + other.position,

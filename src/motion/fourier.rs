@@ -82,25 +82,21 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
     }
 
     /// Time of one period.
-    #[must_use]
     pub fn period(&self) -> Second {
         Second(self.period_s)
     }
 
     /// Centre `q0` of every joint, rad.
-    #[must_use]
     pub fn centre_rad(&self) -> [f32; N] {
         self.centre_rad
     }
 
     /// Amplitudes `s_k` of every joint, rad.
-    #[must_use]
     pub fn sine_rad(&self) -> [[f32; H]; N] {
         self.sine_rad
     }
 
     /// Amplitudes `c_k` of every joint, rad.
-    #[must_use]
     pub fn cosine_rad(&self) -> [[f32; H]; N] {
         self.cosine_rad
     }
@@ -111,7 +107,6 @@ impl<const N: usize, const H: usize> Fourier<N, H> {
 
     /// Position, velocity and acceleration at a phase: `qd = q' w v`, `qdd = q'' (w v)^2 + q' w v'` with the
     /// phase's relative speed `v`.
-    #[must_use]
     pub fn state_at(&self, phase: &Phase) -> MotionState<N> {
         let shape = self.shape_at(phase.turn);
         let rate = self.angular_frequency_rad_per_s * phase.speed;

@@ -52,7 +52,6 @@ pub struct MotionState<const N: usize> {
 
 impl<const N: usize> MotionState<N> {
     /// State at rest in a pose, rad.
-    #[must_use]
     pub const fn at_rest(position_rad: [f32; N]) -> Self {
         Self { position_rad, velocity_rad_per_s: [0.0; N], acceleration_rad_per_s2: [0.0; N] }
     }

@@ -34,7 +34,6 @@ pub struct Phase {
 
 impl Phase {
     /// Phase at full speed.
-    #[must_use]
     pub const fn steady(turn: f32) -> Self {
         Self { turn, speed: 1.0, speed_slope_per_s: 0.0 }
     }
@@ -86,37 +85,31 @@ impl<const N: usize, const H: usize> Periodic<N, H> {
     }
 
     /// Curve with its period rounded to whole ticks.
-    #[must_use]
     pub fn curve(&self) -> &Fourier<N, H> {
         &self.curve
     }
 
     /// Ticks of one cycle.
-    #[must_use]
     pub fn period_ticks(&self) -> u32 {
         self.period_ticks.get()
     }
 
     /// Ticks of one blend; the steady cycles begin at this tick.
-    #[must_use]
     pub fn blend_ticks(&self) -> u32 {
         self.blend_ticks
     }
 
     /// Ticks until the joints are at rest again.
-    #[must_use]
     pub fn duration_ticks(&self) -> u32 {
         self.end
     }
 
     /// True if the phase runs at full speed at this tick.
-    #[must_use]
     pub(crate) fn is_steady(&self, tick: u32) -> bool {
         tick >= self.blend_ticks && tick < self.steady_end
     }
 
     /// Phase `tick` ticks after the start; at rest before and after the motion.
-    #[must_use]
     pub(crate) fn phase_at(&self, tick: u32) -> Phase {
         if self.is_steady(tick) {
             return Phase::steady(
@@ -135,13 +128,11 @@ impl<const N: usize, const H: usize> Periodic<N, H> {
     }
 
     /// State `tick` ticks after the start; at rest before and after the motion.
-    #[must_use]
     pub fn state_at(&self, tick: u32) -> MotionState<N> {
         self.curve.state_at(&self.phase_at(tick))
     }
 
     /// Proven bounds of the motion, including its blends.
-    #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         self.curve.envelope().map(|mut joint| {
             joint.acceleration += RadianPerSecondSquared(joint.speed.0 * 1.5 * self.per_blend_second);

@@ -16,7 +16,6 @@ pub enum Motion<const N: usize, const H: usize = HARMONICS> {
 
 impl<const N: usize, const H: usize> Motion<N, H> {
     /// State `tick` ticks after the start; before and after the motion at rest at its ends.
-    #[must_use]
     pub fn state_at(&self, tick: u32) -> MotionState<N> {
         match self {
             Self::Hold(pose_rad) => MotionState::at_rest(*pose_rad),
@@ -26,7 +25,6 @@ impl<const N: usize, const H: usize> Motion<N, H> {
     }
 
     /// Ticks until the joints are at rest at the motion's end; `None` for a held pose.
-    #[must_use]
     pub fn duration_ticks(&self) -> Option<u32> {
         match self {
             Self::Hold(_) => None,
@@ -36,19 +34,16 @@ impl<const N: usize, const H: usize> Motion<N, H> {
     }
 
     /// Pose at rest before the motion, rad.
-    #[must_use]
     pub fn start_rad(&self) -> [f32; N] {
         self.state_at(0).position_rad
     }
 
     /// Pose at rest after the motion, rad.
-    #[must_use]
     pub fn end_rad(&self) -> [f32; N] {
         self.state_at(u32::MAX).position_rad
     }
 
     /// Proven bounds of the whole motion.
-    #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         match self {
             Self::Hold(pose_rad) => pose_rad.map(|angle| JointEnvelope {

@@ -65,13 +65,11 @@ impl<const N: usize> Ramp<N> {
     }
 
     /// Ticks until the joints are at rest at their goal.
-    #[must_use]
     pub fn duration_ticks(&self) -> u32 {
         self.duration_ticks
     }
 
     /// State `tick` ticks after the start; at rest in the goal from the last tick on.
-    #[must_use]
     pub fn state_at(&self, tick: u32) -> MotionState<N> {
         if tick >= self.duration_ticks {
             return MotionState::at_rest(self.to_rad);
@@ -93,7 +91,6 @@ impl<const N: usize> Ramp<N> {
     }
 
     /// Exact bounds of the ramp, with 16 units in the last place for the arithmetic of the tick.
-    #[must_use]
     pub fn envelope(&self) -> [JointEnvelope; N] {
         core::array::from_fn(|joint| {
             let (from, to) = (self.from_rad[joint], self.to_rad[joint]);

@@ -36,34 +36,29 @@ impl AbsoluteAngle {
     pub const STEPS: i32 = 1 << 14;
 
     /// Angle of so many steps, reduced to one turn.
-    #[must_use]
     pub const fn from_steps(steps: u16) -> Self {
         Self(steps & ANGLE)
     }
 
     /// Angle in a frame; `None` with wrong parity or a set error flag. A line without a chip reads as all
     /// ones, which has the error flag.
-    #[must_use]
     pub(crate) const fn from_frame(frame: u16) -> Option<Self> {
         let is_valid = frame.count_ones().is_multiple_of(2) && frame & ERROR == 0;
         if is_valid { Some(Self(frame & ANGLE)) } else { None }
     }
 
     /// Frame that carries this angle.
-    #[must_use]
     #[cfg(test)]
     pub(crate) const fn to_frame(self) -> u16 {
         self.0 | ((self.0.count_ones() & 1) << 15) as u16
     }
 
     /// Steps from zero, below [`Self::STEPS`].
-    #[must_use]
     pub const fn steps(self) -> u16 {
         self.0
     }
 
     /// Counts from zero of an incremental interface with so many counts per turn, at most 65,536.
-    #[must_use]
     pub const fn counts(self, counts_per_turn: i32) -> i32 {
         (self.0 as i32 * counts_per_turn) >> 14
     }
@@ -73,7 +68,6 @@ const ERROR: u16 = 1 << 14;
 const ANGLE: u16 = ERROR - 1;
 
 /// Reduces a difference of positions to half a turn in either direction; zero for a turn of zero.
-#[must_use]
 pub(crate) fn within_half_a_turn(difference: i32, turn: i32) -> i32 {
     let within = difference.checked_rem_euclid(turn).unwrap_or_default();
     if within > turn / 2 { within - turn } else { within }

@@ -72,38 +72,32 @@ impl ElectricalAngle {
     pub(crate) const ZERO: Self = Self(0);
 
     /// Converts turns; whole turns are dropped. Valid for -32,768..=32,767.
-    #[must_use]
     pub fn from_turns(turns: f32) -> Self {
         let whole = turns as i32;
         Self(((turns - whole as f32) * TURN) as i64 as u32)
     }
 
     /// Turns from -0.5 to 0.5.
-    #[must_use]
     pub fn turns(self) -> f32 {
         self.0.cast_signed() as f32 * (1.0 / TURN)
     }
 
     /// Signed difference from `other` to this angle, turns from -0.5 to 0.5.
-    #[must_use]
     pub(crate) fn since(self, other: Self) -> f32 {
         Self(self.0.wrapping_sub(other.0)).turns()
     }
 
     /// Sum of both angles, modulo one turn.
-    #[must_use]
     pub const fn plus(self, other: Self) -> Self {
         Self(self.0.wrapping_add(other.0))
     }
 
     /// Difference of both angles, modulo one turn.
-    #[must_use]
     pub(crate) const fn minus(self, other: Self) -> Self {
         Self(self.0.wrapping_sub(other.0))
     }
 
     /// Sine and cosine.
-    #[must_use]
     #[inline(always)]
     pub(crate) fn rotation(self) -> Rotation {
         let (sine, cosine) = sin_cos_of_turns(self.0);
@@ -136,13 +130,11 @@ pub(crate) struct SpeedTracker {
 
 impl SpeedTracker {
     /// A tracker at rest at an angle.
-    #[must_use]
     pub const fn at(angle: ElectricalAngle) -> Self {
         Self { estimate: angle, speed: 0.0 }
     }
 
     /// A tracker that starts at an angle with a speed, electrical rad/s.
-    #[must_use]
     pub const fn turning(angle: ElectricalAngle, rad_per_s: f32) -> Self {
         Self { estimate: angle, speed: rad_per_s / (RADIAN_PER_UNIT * CURRENT_RATE_HZ as f32) }
     }
@@ -156,13 +148,11 @@ impl SpeedTracker {
     }
 
     /// Electrical speed, rad/s.
-    #[must_use]
     pub(crate) fn rad_per_s(&self) -> f32 {
         self.speed * (RADIAN_PER_UNIT * CURRENT_RATE_HZ as f32)
     }
 
     /// Predicted rotation some ticks after this one, at the tracked speed; up to an eighth of a turn ahead.
-    #[must_use]
     #[inline(always)]
     pub(crate) fn ahead(&self, rotor: Rotation, ticks: f32) -> Rotation {
         let units = ((self.speed * ticks) as i32).clamp(-MOST_AHEAD, MOST_AHEAD - 1);
@@ -182,7 +172,6 @@ impl CountScale {
     /// Scale of an encoder with `counts_per_turn` (16..=65,536) and a motor with `pole_pairs`
     /// (1..=64). Returns `None` outside these ranges, and where a count is not less than a quarter of
     /// an electrical turn.
-    #[must_use]
     pub fn new(counts_per_turn: u32, pole_pairs: u8) -> Option<Self> {
         let possible = (16..=65_536).contains(&counts_per_turn)
             && (1..=64).contains(&pole_pairs)
@@ -194,13 +183,11 @@ impl CountScale {
     }
 
     /// Counts per mechanical turn.
-    #[must_use]
     pub(crate) const fn counts_per_turn(&self) -> i32 {
         self.counts_per_turn
     }
 
     /// Moves a position within one turn by less than one turn and wraps the result.
-    #[must_use]
     pub(crate) const fn moved(&self, position: i32, step: i32) -> i32 {
         let position = position + step;
         if position >= self.counts_per_turn {
@@ -213,14 +200,12 @@ impl CountScale {
     }
 
     /// Reduces any number of counts to one turn.
-    #[must_use]
     pub(crate) fn within_turn(&self, counts: i32) -> i32 {
         // A turn has at least 16 counts. The checked form leaves no panic in the image.
         counts.checked_rem_euclid(self.counts_per_turn).unwrap_or_default()
     }
 
     /// Electrical angle at the middle of a count.
-    #[must_use]
     pub(crate) const fn angle(&self, position: i32) -> ElectricalAngle {
         ElectricalAngle(
             position

@@ -265,13 +265,11 @@ impl Axis {
     }
 
     /// Currents of the last tick, in the electrical sense.
-    #[must_use]
     pub(crate) fn measured(&self) -> Rotating<Ampere> {
         self.measured
     }
 
     /// The fault that stopped the axis, if any.
-    #[must_use]
     pub fn fault(&self) -> Option<AxisFault> {
         self.fault
     }
@@ -279,19 +277,16 @@ impl Axis {
     /// Whether the rotor angle was measured or has agreed with the back-EMF. Until then current and speed are
     /// limited.
     #[inline(always)]
-    #[must_use]
     pub fn is_proven(&self) -> bool {
         !self.first_motion.is_limited()
     }
 
     /// Share of the current limit that is permitted now, 0..=1.
-    #[must_use]
     pub(crate) fn current_share(&self) -> f32 {
         self.current_limit / self.constants.current_limit
     }
 
     /// Rotor position or parameters are lost and require a new calibration.
-    #[must_use]
     pub(crate) fn is_lost(&self) -> bool {
         self.lost
     }
@@ -477,7 +472,6 @@ impl Axis {
 
     /// Square of the current vector at the last tick, A^2.
     #[inline(always)]
-    #[must_use]
     pub(crate) const fn square_a2(&self) -> f32 {
         let (d, q) = (self.measured.d.0, self.measured.q.0);
         d * d + q * q
@@ -485,7 +479,6 @@ impl Axis {
 
     /// Electrical angle of the current rotor position.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn angle(&self) -> ElectricalAngle {
         self.constants.scale.angle(self.position).plus(self.constants.offset)
     }
@@ -493,7 +486,6 @@ impl Axis {
     /// Electrical power into the motor at the last tick, W; negative where the motor returns energy to the
     /// bus. Valid while the bridge follows a current or is off, not while it brakes.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn power_w(&self) -> f32 {
         self.current_loop.power_w(&self.constants.gains, self.measured, self.speed.rad_per_s())
     }

@@ -32,7 +32,6 @@ impl Chopper {
     /// Returns `None` unless `begin` is at least 5 V and `full` at least half a volt above it. `full` must
     /// also lie within the range of the board's divider (`SenseScale::greatest_bus`, 59.6 V); beyond, the
     /// ramp would never be reached.
-    #[must_use]
     pub fn new(begin: Volt, full: Volt) -> Option<Self> {
         let sensible =
             begin.0 >= 5.0 && full.0 >= begin.0 + 0.5 && full <= SenseScale::ODRIVE_3_6.greatest_bus();
@@ -41,13 +40,11 @@ impl Chopper {
 
     /// Whether the resistor conducts at a bus voltage.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn conducts(&self, bus: Volt) -> bool {
         bus.0 > self.begin.0
     }
 
     /// Duty of the resistor at a bus voltage, 0..=0.95.
-    #[must_use]
     pub fn duty(&self, bus: Volt) -> f32 {
         if self.conducts(bus) { self.ramp(bus) } else { 0.0 }
     }
@@ -87,7 +84,6 @@ impl BrakeBudget {
 
     /// Whether nothing was used.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn is_full(&self) -> bool {
         self.left_s == Self::WHOLE_S
     }

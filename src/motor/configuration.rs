@@ -21,7 +21,6 @@ pub enum Direction {
 
 impl Direction {
     /// 1 or -1.
-    #[must_use]
     pub(crate) const fn sign(self) -> i32 {
         match self {
             Self::Up => 1,

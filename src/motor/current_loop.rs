@@ -79,7 +79,6 @@ impl CurrentGains {
     /// Derives the gains for a bandwidth of 50..=2000 Hz. Returns `None` for other bandwidths and for
     /// implausible motor constants (allowed: 1 mOhm..10 Ohm, 1 uH..10 mH, flux to 1 V s). Without
     /// `feedforward` the integrals supply cross-coupling and back-EMF.
-    #[must_use]
     pub fn new(motor: &MotorConstants, bandwidth: Hertz, feedforward: bool) -> Option<Self> {
         let inductance_h = Rotating { d: motor.direct_inductance.0, q: motor.quadrature_inductance.0 };
         let sensible = (50.0..=2000.0).contains(&bandwidth.0)
@@ -119,7 +118,6 @@ impl CurrentGains {
     }
 
     /// Adds all constants to a checksum.
-    #[must_use]
     pub(super) fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { proportional_ohm, resistance_ohm, renewal, inductance_h, flux_vs, bandwidth } = *self;
         let pairs = [proportional_ohm, renewal, inductance_h];
@@ -146,7 +144,6 @@ pub(crate) struct CurrentLoop {
 
 impl CurrentLoop {
     /// A loop that takes over from a voltage that held a current at rest.
-    #[must_use]
     pub(super) fn holding(voltage: Rotating<Volt>) -> Self {
         Self { integral_v: Rotating { d: voltage.d.0, q: voltage.q.0 } }
     }
@@ -191,7 +188,6 @@ impl CurrentLoop {
     }
 
     /// Integrals: the realised voltages less feedforward, filtered as resistance times current.
-    #[must_use]
     pub(super) fn integral_v(&self) -> Rotating<f32> {
         self.integral_v
     }

@@ -67,7 +67,6 @@ pub(crate) struct Rotating<Q> {
 
 impl<Q: Quantity> Phases<Q> {
     /// Clarke's transformation; the common-mode component is lost.
-    #[must_use]
     pub(crate) fn to_stationary(self) -> Stationary<Q> {
         Stationary {
             alpha: (self.a + self.a - self.b - self.c) * (1.0 / 3.0),
@@ -78,26 +77,22 @@ impl<Q: Quantity> Phases<Q> {
 
 impl<Q: Quantity> Stationary<Q> {
     /// Clarke's transformation of two phases, for a sum of zero over all three: currents without a neutral.
-    #[must_use]
     pub(crate) fn from_two_phases(b: Q, c: Q) -> Self {
         Self { alpha: -(b + c), beta: (b - c) * ONE_OVER_SQRT_3 }
     }
 
     /// [`Rotating::to_stationary`] of a vector without direct component.
-    #[must_use]
     pub(crate) fn from_quadrature(q: Q, rotor: Rotation) -> Self {
         Self { alpha: -(q * rotor.sine), beta: q * rotor.cosine }
     }
 
     /// Inverse Clarke's transformation; the three phases sum to zero.
-    #[must_use]
     pub(crate) fn to_phases(self) -> Phases<Q> {
         let (half, beta) = (self.alpha * -0.5, self.beta * HALF_SQRT_3);
         Phases { a: self.alpha, b: half + beta, c: half - beta }
     }
 
     /// Park's transformation into the frame of a rotor at an angle.
-    #[must_use]
     pub(crate) fn to_rotating(self, rotor: Rotation) -> Rotating<Q> {
         Rotating {
             d: self.alpha * rotor.cosine + self.beta * rotor.sine,
@@ -108,7 +103,6 @@ impl<Q: Quantity> Stationary<Q> {
 
 impl<Q: Quantity> Rotating<Q> {
     /// Inverse Park's transformation, from the frame of a rotor at an angle.
-    #[must_use]
     pub(crate) fn to_stationary(self, rotor: Rotation) -> Stationary<Q> {
         Stationary {
             alpha: self.d * rotor.cosine - self.q * rotor.sine,

@@ -131,7 +131,6 @@ pub(crate) struct ModelLimits {
 
 impl ModelLimits {
     /// Limits of a motor as it was calibrated.
-    #[must_use]
     pub fn new(configuration: &AxisConfiguration, motor: &MotorConstants, scale: CountScale) -> Self {
         let [_, bus] = configuration.bus;
         let still_v = DEAD_VECTORS * configuration.timing.dead_time.0 * CURRENT_RATE_HZ as f32 * bus.0;
@@ -159,7 +158,6 @@ impl ModelLimits {
     }
 
     /// Electrical speed above which a frozen counter is detected at a current, rad/s.
-    #[must_use]
     pub(crate) fn frozen_speed(&self, current: Ampere) -> f32 {
         (self.still_v + self.volt_per_ampere * current.0) / self.back_emf_per_speed
     }
@@ -283,7 +281,6 @@ impl ModelWatch {
 
     /// Whether the counter has stood still since voltages and currents began to disagree. Any fault found
     /// then also makes the rotor position doubtful.
-    #[must_use]
     pub(crate) fn doubts(&self, limits: &ModelLimits, position: i32) -> bool {
         self.suspicion > 0 && limits.is_still(position, self.position)
     }
@@ -299,7 +296,6 @@ impl ModelWatch {
     }
 
     /// Electrical speed whose back-EMF equals the last period's residual, rad/s.
-    #[must_use]
     pub(crate) fn uncounted(&self, limits: &ModelLimits) -> f32 {
         sqrt(self.square) / limits.back_emf_per_speed
     }

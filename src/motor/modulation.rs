@@ -97,7 +97,6 @@ pub struct Modulator {
 
 impl Modulator {
     /// Returns `None` unless at least half of the period remains for conduction and the band is positive.
-    #[must_use]
     pub fn new(timing: BridgeTiming, dead_time: DeadTime) -> Option<Self> {
         let rate = CURRENT_RATE_HZ as f32;
         let before = timing.dead_time.0 + timing.settling.0;
@@ -124,20 +123,17 @@ impl Modulator {
     }
 
     /// Smallest change of a duty, as share of a period.
-    #[must_use]
     pub(crate) const fn duty_step(&self) -> f32 {
         self.duty_step
     }
 
     /// Longest voltage vector that is available in any direction.
-    #[must_use]
     pub fn voltage_limit(&self, bus: Volt) -> Volt {
         bus * self.circle_per_bus
     }
 
     /// Computes the duties of A, B and C for a voltage. `per_bus` is one over the bus voltage, `target` the
     /// target current while they act. A voltage that is not finite gives duties that are NaN.
-    #[must_use]
     #[inline(always)]
     pub fn duties(&self, voltage: Stationary<Volt>, per_bus: f32, target: Stationary<Ampere>) -> [f32; 3] {
         let Phases { a, b, c } =

@@ -31,7 +31,6 @@ pub(crate) struct StatedPose {
 
 impl StatedPose {
     /// Creates a reference called `rate` times per second; `None` for a rate outside 100 Hz..100 kHz.
-    #[must_use]
     pub fn new(rate: Hertz) -> Option<Self> {
         let stand_ticks = (0.5 * rate.0) as u32;
         (100.0..=100_000.0).contains(&rate.0).then_some(Self { stand_ticks, first: None, ticks: 0 })

@@ -38,14 +38,12 @@ impl SenseScale {
     };
 
     /// Bus voltage of a code.
-    #[must_use]
     pub fn bus(&self, code: u16) -> Volt {
         self.volt_per_code * f32::from(code)
     }
 
     /// Current vector of the codes of B and C, with their current-sensor offsets; `None` where a code is
     /// at a rail.
-    #[must_use]
     #[inline(always)]
     pub(crate) fn currents(&self, codes: [u16; 2], current_offsets: [f32; 2]) -> Option<Stationary<Ampere>> {
         let [b, c] = codes;
@@ -60,7 +58,6 @@ impl SenseScale {
 
     /// Largest phase current that both shunts can measure, for any offsets within `spread` codes
     /// of the middle.
-    #[must_use]
     pub(crate) fn range(&self, spread: u16) -> Ampere {
         let below = 2048_u16.saturating_sub(self.rails[0]);
         let above = self.rails[1].saturating_sub(2048);
@@ -71,7 +68,6 @@ impl SenseScale {
 
     /// Greatest permissible bus-voltage limit: 95 % of the converter's range. A voltage beyond the limit then
     /// still shows with a divider that is 3 % off.
-    #[must_use]
     pub(crate) fn greatest_bus(&self) -> Volt {
         self.bus(4095) * 0.95
     }

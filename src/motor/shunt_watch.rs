@@ -80,7 +80,6 @@ impl ShuntWatch {
 
     /// Change of a phase's target current beyond which its code must move; see the module. `dead` is the mean
     /// voltage that dead time takes, `ohm` the loop's proportional gain.
-    #[must_use]
     pub(crate) fn target_change(dead: Volt, ohm: f32) -> Ampere {
         Ampere(max(LEAST_CHANGE_A, BEYOND_DEAD_TIME * dead.0 / ohm))
     }

@@ -14,7 +14,6 @@ pub struct AssistLevel<const N: usize> {
 
 impl<const N: usize> AssistLevel<N> {
     /// Level without a session.
-    #[must_use]
     pub const fn new() -> Self {
         Self { law: AssistLaw::new() }
     }
@@ -36,7 +35,6 @@ impl<const N: usize> AssistLevel<N> {
     }
 
     /// The law, with its energy observer and oscillators.
-    #[must_use]
     pub const fn law(&self) -> &AssistLaw<N> {
         &self.law
     }

@@ -72,13 +72,11 @@ impl AxisState {
     pub const OFF: Self = Self { mode: AxisMode::Off, faulted: None, search: IndexSearch::EMPTY };
 
     /// A running axis that was calibrated elsewhere.
-    #[must_use]
     pub const fn running(axis: Axis) -> Self {
         Self { mode: AxisMode::Running(axis), ..Self::OFF }
     }
 
     /// Returns whether the axis has a calibration.
-    #[must_use]
     pub const fn is_running(&self) -> bool {
         matches!(self.mode, AxisMode::Running(_))
     }
@@ -93,7 +91,6 @@ impl AxisState {
     }
 
     /// The fault of a running axis.
-    #[must_use]
     pub fn fault(&self) -> Option<AxisFault> {
         match &self.mode {
             AxisMode::Running(axis) => axis.fault(),

@@ -71,7 +71,6 @@ pub struct BusRound {
 
 impl BusRound {
     /// State before the first frame.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             controller: Controller::Active,

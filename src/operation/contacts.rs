@@ -86,7 +86,6 @@ impl From<CommissioningStep> for OperatorRequest {
 
 impl OperatorRequest {
     /// Word used in records.
-    #[must_use]
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Power(PowerRequest::Shutdown) => "shutdown",
@@ -144,14 +143,12 @@ pub(crate) struct Operator {
 
 impl Operator {
     /// Returns whether the switch is held, debounced, and was open before.
-    #[must_use]
     pub(crate) const fn holds(&self) -> bool {
         self.trusted && self.enabling.closed
     }
 
     /// Returns why a step of commissioning is refused now, or `None`. The reasons are those for which the
     /// start button requests nothing.
-    #[must_use]
     pub(crate) fn refusal(&self, step: CommissioningStep, now: &Situation) -> Option<StepResult> {
         use CommissioningStep::{Calibrate, Reference, Reset};
         use StepResult::{

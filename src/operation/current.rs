@@ -98,7 +98,6 @@ pub struct CurrentLoops<const N: usize> {
 
 impl<const N: usize> CurrentLoops<N> {
     /// Creates the loops with these axis states; `period` is the PWM period in ticks of the board's clock.
-    #[must_use]
     pub fn new(
         states: [AxisState; N],
         period: NonZeroU32,
@@ -129,7 +128,6 @@ impl<const N: usize> CurrentLoops<N> {
     }
 
     /// State of an axis.
-    #[must_use]
     pub fn axis_state(&self, axis: usize) -> Option<&AxisState> {
         self.axes.get(axis).map(|axis| &axis.stage)
     }

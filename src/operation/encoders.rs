@@ -40,7 +40,6 @@ pub struct EncoderSettings {
 
 impl EncoderSettings {
     /// Encoders of a motor.
-    #[must_use]
     pub const fn new(motor: &MotorDescription) -> Self {
         Self { absolute: motor.absolute, counts_per_turn: motor.counts_per_turn, ratio: motor.ratio }
     }

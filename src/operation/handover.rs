@@ -24,7 +24,6 @@ pub struct Handover<T> {
 
 impl<T> Handover<T> {
     /// Creates an idle handover.
-    #[must_use]
     pub const fn new(value: T) -> Self {
         Self { turn: Word::new(IDLE), value: Mutex::new(value) }
     }

@@ -58,7 +58,6 @@ fn is_held<const N: usize>(signals: &Signals<N>, hardware: &impl Hardware<N>) ->
 
 impl<const N: usize> HostSide<N> {
     /// State before the first order.
-    #[must_use]
     pub const fn new(following: Following<N>, volt_per_code: Volt) -> Self {
         Self {
             following,
@@ -132,7 +131,6 @@ impl<const N: usize> HostSide<N> {
     }
 
     /// Joints that a host permits to return into their range.
-    #[must_use]
     pub(crate) const fn may_return(&self) -> [bool; N] {
         self.may_return
     }
@@ -209,7 +207,6 @@ impl<const N: usize> HostSide<N> {
     }
 
     /// Whether a host has the drive.
-    #[must_use]
     pub(crate) const fn has_drive(&self) -> bool {
         self.commands.is_some()
     }

@@ -156,7 +156,6 @@ pub struct Housekeeper<const N: usize> {
 
 impl<const N: usize> Housekeeper<N> {
     /// State without any calibration; windings are assumed warm.
-    #[must_use]
     pub fn new(settings: HousekeepingSettings<N>) -> Self {
         Self {
             settings,
@@ -190,13 +189,11 @@ impl<const N: usize> Housekeeper<N> {
     }
 
     /// State with all axes calibrated and referenced elsewhere: they run, and the servo has begun.
-    #[must_use]
     pub fn ready(settings: HousekeepingSettings<N>) -> Self {
         Self { calibrated: [true; N], ..Self::new(settings) }
     }
 
     /// Sets the temperatures of the windings, degrees Celsius.
-    #[must_use]
     pub fn with_windings(self, celsius: [f32; N]) -> Self {
         let mut celsius = celsius.into_iter();
         let windings = self.settings.windings.map(|rating| Winding::new(rating, celsius.next()));
@@ -204,13 +201,11 @@ impl<const N: usize> Housekeeper<N> {
     }
 
     /// Sets the readings at the joints' zeros, of axes that are ready.
-    #[must_use]
     pub fn with_joint_zeros(self, joint_zeros: [Option<JointZero>; N]) -> Self {
         Self { joint_zeros, ..self }
     }
 
     /// Adds stored calibrations.
-    #[must_use]
     pub fn with_stored(self, stored: [Option<StoredCalibration>; N]) -> Self {
         let HousekeepingSettings { axes, encoders, .. } = &self.settings;
         let joint_zeros = core::array::from_fn(|axis| {

@@ -47,7 +47,6 @@ pub enum Slice<const N: usize> {
 
 impl IdentificationLevel {
     /// State before the first event; `seed` is used unless a host gives another.
-    #[must_use]
     pub const fn new(seed: u64) -> Self {
         Self {
             activity: Activity::Idle,
@@ -202,7 +201,6 @@ impl IdentificationLevel {
     }
 
     /// Changed results to be published; see [`Self::published`].
-    #[must_use]
     pub const fn unpublished(&self) -> Option<Option<Verdict>> {
         self.publish
     }
@@ -213,25 +211,21 @@ impl IdentificationLevel {
     }
 
     /// Activity of the leg after the newest event.
-    #[must_use]
     pub const fn activity(&self) -> Activity {
         self.activity
     }
 
     /// Tick of the newest sample.
-    #[must_use]
     pub fn tick(&self) -> u32 {
         self.last.map_or(0, |(tick, _)| tick)
     }
 
     /// Whether the leg of the current identification is empty or worn, if known.
-    #[must_use]
     pub const fn wearing(&self) -> Option<Wearing> {
         self.wearing
     }
 
     /// Seed of the current search.
-    #[must_use]
     pub const fn seed(&self) -> u64 {
         self.seed
     }

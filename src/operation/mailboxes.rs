@@ -39,7 +39,6 @@ pub(crate) struct TxScheduler {
 
 impl TxScheduler {
     /// State before the first frame.
-    #[must_use]
     pub const fn new() -> Self {
         Self { first: 0, since_us: None, given: [None; MAILBOXES], count: 0, again: [None; MAILBOXES] }
     }

@@ -176,7 +176,6 @@ fn split_all<'a, T, const L: usize, const N: usize>(
 
 impl<const N: usize> Queues<N> {
     /// Creates empty queues.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             orders: [const { Queue::new() }; N],
@@ -191,7 +190,6 @@ impl<const N: usize> Queues<N> {
     }
 
     /// Splits every queue. A board with a bus then sets the servo's ends towards it.
-    #[must_use]
     pub fn split<'a>(&'a mut self, events: &'a mut EventQueue<N>) -> Ends<'a, N> {
         let (give_orders, take_orders) = split_all(&mut self.orders);
         let (give_outcomes, take_outcomes) = split_all(&mut self.outcomes);
@@ -253,7 +251,6 @@ impl<const N: usize> Queues<N> {
 
     /// Newest sample of a joint that waits for the servo.
     #[cfg(not(target_os = "none"))]
-    #[must_use]
     pub fn newest_sample(&self, joint: usize) -> Option<JointSample> {
         self.samples.get(joint).and_then(|queue| queue.iter().last().copied())
     }
@@ -296,7 +293,6 @@ pub struct AssistEnds<'a, const N: usize> {
 
 impl<const N: usize> AssistQueues<N> {
     /// Creates empty queues.
-    #[must_use]
     pub const fn new() -> Self {
         Self { sessions: Queue::new(), samples: Queue::new(), torques: Queue::new() }
     }
@@ -345,7 +341,6 @@ pub struct BusEnds<'a, const N: usize> {
 
 impl<const N: usize> BusQueues<N> {
     /// Creates empty queues.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             frames: Queue::new(),

@@ -69,7 +69,6 @@ pub struct ServoLevel<const N: usize> {
 
 impl<const N: usize> ServoLevel<N> {
     /// State before the first tick. `following` is required for a host's commands; `None` without a bus.
-    #[must_use]
     pub fn new(
         control: &Control<N>,
         ramps: DeratingRamps,
@@ -99,13 +98,11 @@ impl<const N: usize> ServoLevel<N> {
     }
 
     /// Adds limits of the supply current; without them there are none.
-    #[must_use]
     pub fn with_supply(self, limits: SupplyLimits) -> Self {
         Self { supply_current: SupplyCurrent::new(limits), ..self }
     }
 
     /// Adds a holding brake, if there is one.
-    #[must_use]
     pub fn with_holding_brake(self, delays: Option<BrakeDelays>) -> Self {
         Self { holding_brake: delays.map(HoldingBrake::new), ..self }
     }
@@ -189,7 +186,6 @@ impl<const N: usize> ServoLevel<N> {
     }
 
     /// Shares of the torque that the limits of the supply current leave (`SupplyCurrent::shares`).
-    #[must_use]
     pub fn supply_shares(&self) -> [f32; 2] {
         self.supply_current.shares()
     }

@@ -21,7 +21,6 @@ pub struct Word(AtomicU32);
 
 impl Word {
     /// Creates a word with this value.
-    #[must_use]
     pub const fn new(value: u32) -> Self {
         Self(AtomicU32::new(value))
     }
@@ -107,7 +106,6 @@ pub struct Inhibit {
 
 impl Inhibit {
     /// No inhibit reason is set.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             causes: Word::new(0),
@@ -139,21 +137,18 @@ impl Inhibit {
 
     /// All inhibit bits.
     #[inline(always)]
-    #[must_use]
     pub fn causes(&self) -> u32 {
         self.causes.get()
     }
 
     /// No inhibit reason is set.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn is_clear(&self) -> bool {
         self.causes() == 0
     }
 
     /// Returns whether the flash is being written, which may stall the processor for seconds.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn is_storing(&self) -> bool {
         self.causes() & InhibitReason::Storing.bit() != 0
     }
@@ -295,7 +290,6 @@ pub struct Signals<const N: usize> {
 
 impl<const N: usize> Signals<N> {
     /// State after the start: all axes off, the servo not begun.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             inhibit: Inhibit::new(),
@@ -325,7 +319,6 @@ impl<const N: usize> Signals<N> {
 
     /// Current target of an axis.
     #[inline(always)]
-    #[must_use]
     pub fn target(&self, axis: usize) -> AxisRequest {
         match self.targets.get(axis).map(Word::get) {
             None | Some(OFF) => AxisRequest::OFF,
@@ -357,7 +350,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Returns whether the joints' samples are valid.
-    #[must_use]
     pub fn has_begun(&self) -> bool {
         self.begun.get() != 0
     }
@@ -392,7 +384,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Temperature of the hottest bridge, degrees Celsius; NaN, which leaves no torque, if one is unknown.
-    #[must_use]
     pub(crate) fn hottest_c(&self) -> f32 {
         let hottest = |hottest: f32, bridge: &Word| {
             let celsius = f32::from_bits(bridge.get());
@@ -436,13 +427,11 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Bandwidths of the position loops that a host has set.
-    #[must_use]
     pub(crate) fn position_bandwidths(&self) -> [Option<Hertz>; N] {
         self.bandwidths.each_ref().map(|[position, _]| bandwidth(position))
     }
 
     /// Bandwidths of the current loops that a host has set.
-    #[must_use]
     pub(crate) fn current_bandwidths(&self) -> [Option<Hertz>; N] {
         self.bandwidths.each_ref().map(|[_, current]| bandwidth(current))
     }
@@ -478,13 +467,11 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Status of a new image; under way while a command waits.
-    #[must_use]
     pub(crate) fn program_status(&self) -> ProgramStatus {
         ProgramStatus(self.program[1].get()).with(ProgramStatus::UNDER_WAY, self.program[0].get() != 0)
     }
 
     /// Whether the flash is or will be changed for a new image.
-    #[must_use]
     pub(crate) fn program_pauses(&self) -> bool {
         self.program[1].get() & (ProgramStatus::UNDER_WAY | ProgramStatus::STOPPED) != 0
     }
@@ -500,7 +487,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// State and telemetry for the bus.
-    #[must_use]
     pub(crate) fn board_status(&self) -> BoardStatus<N> {
         let real = |word: &Word| f32::from_bits(word.get());
         let is_asked = self.asked.get() != 0;
@@ -530,7 +516,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Wrapping integral of a motor's squared current, unit: a sixteenth of A^2 over a servo period.
-    #[must_use]
     pub(crate) fn i2t(&self, axis: usize) -> u32 {
         self.i2t.get(axis).map_or(0, Word::get)
     }
@@ -544,7 +529,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Permitted share of an axis' current limit; NaN leaves no torque.
-    #[must_use]
     pub(crate) fn current_share(&self, axis: usize) -> f32 {
         self.current_shares.get(axis).map_or(f32::NAN, |share| f32::from_bits(share.get()))
     }
@@ -559,7 +543,6 @@ impl<const N: usize> Signals<N> {
 
     /// Sum of the axes' electrical powers, W; zero while an inhibit reason holds, because shorted motors take
     /// nothing from the bus.
-    #[must_use]
     pub(crate) fn power_w(&self) -> f32 {
         if self.inhibit.is_clear() {
             self.powers.iter().fold(0.0, |sum, power| sum + f32::from_bits(power.get()))
@@ -570,14 +553,12 @@ impl<const N: usize> Signals<N> {
 
     /// Least duty of the brake resistor, 0..=0.95, by the servo.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn wanted_brake(&self) -> f32 {
         f32::from_bits(self.brake[0].get())
     }
 
     /// Whether the servo wants the brake resistor.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn wants_brake(&self) -> bool {
         self.brake[0].get() != 0
     }
@@ -588,7 +569,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Duty that the brake resistor was given in the last tick; zero without a resistor.
-    #[must_use]
     pub fn given_brake(&self) -> f32 {
         f32::from_bits(self.brake[1].get())
     }
@@ -600,13 +580,11 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Temperature of a winding, degrees Celsius, by its model.
-    #[must_use]
     pub fn winding_c(&self, joint: usize) -> f32 {
         self.windings.get(joint).map_or(f32::NAN, |[celsius, _]| f32::from_bits(celsius.get()))
     }
 
     /// Share of a joint's torque cap that its winding leaves; NaN leaves no torque.
-    #[must_use]
     pub fn winding_share(&self, joint: usize) -> f32 {
         self.windings.get(joint).map_or(f32::NAN, |[_, share]| f32::from_bits(share.get()))
     }
@@ -620,7 +598,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Permission of the drive since the servo's last tick; off before its first.
-    #[must_use]
     pub fn permission(&self) -> Permission {
         match self.permission.get() {
             0 => Permission::Off,
@@ -635,7 +612,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Returns whether a host has the drive; then closing the enabling switch permits but requests nothing.
-    #[must_use]
     pub(crate) fn is_hosted(&self) -> bool {
         self.hosted[0].get() != 0
     }
@@ -655,7 +631,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Returns the operator's permission: the debounced enabling switch, false during a reset.
-    #[must_use]
     pub(crate) fn permits(&self) -> bool {
         self.permits.get() != 0
     }
@@ -666,7 +641,6 @@ impl<const N: usize> Signals<N> {
     }
 
     /// Returns whether every axis has a calibration.
-    #[must_use]
     pub(crate) fn is_calibrated(&self) -> bool {
         self.board_state.get() & u32::from(BoardState::CALIBRATED) != 0
     }

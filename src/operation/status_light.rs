@@ -50,7 +50,6 @@ pub(crate) struct LightInputs {
 
 impl StatusLight {
     /// Chooses what to show.
-    #[must_use]
     pub(crate) const fn from_inputs(inputs: &LightInputs) -> Self {
         let LightInputs { is_on, is_calibrating, is_inhibited, is_on_trial, is_calibrated, is_referenced } =
             *inputs;
@@ -66,7 +65,6 @@ impl StatusLight {
     }
 
     /// Whether the light is lit in a round of level 6.
-    #[must_use]
     pub(crate) const fn is_lit(self, round: u32) -> bool {
         let ms = round % (CYCLE_MS * RATE_HZ / 1000) * (1000 / RATE_HZ);
         match self {

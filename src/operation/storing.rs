@@ -79,7 +79,6 @@ pub struct Storing {
 impl Storing {
     /// State after the start. The watchdog may still have the start's period, until [`Self::supervise`] has
     /// checked.
-    #[must_use]
     pub const fn new() -> Self {
         Self { stage: Stage::Idle, loose: true }
     }

@@ -30,7 +30,6 @@ fn between(from_us: u64, to_us: u64) -> i64 {
 
 impl TokenBucket {
     /// Starts with the largest balance.
-    #[must_use]
     pub const fn new() -> Self {
         Self { left_us: MOST_US, refilled_us: 0, spent_us: 0 }
     }
@@ -48,13 +47,11 @@ impl TokenBucket {
     }
 
     /// Returns whether work may start.
-    #[must_use]
     pub(crate) const fn may_start(&self) -> bool {
         self.left_us >= 0
     }
 
     /// Returns whether started work may continue. Many cheap frames in one round cost less than one by one.
-    #[must_use]
     pub(crate) const fn may_continue(&self) -> bool {
         self.left_us > -MOST_US
     }

@@ -62,7 +62,6 @@ pub struct Update {
 
 impl Update {
     /// State after the start; `is_on_trial`: the running image is not confirmed.
-    #[must_use]
     pub const fn new(is_on_trial: bool) -> Self {
         Self {
             stage: Stage::Waits,

@@ -20,7 +20,6 @@ pub struct Watch<const N: usize> {
 
 impl<const N: usize> Watch<N> {
     /// Starts from the present counts.
-    #[must_use]
     pub fn new(signals: &Signals<N>) -> Self {
         Self { guard: TickGuard::new(), check_ins: CheckIns::new(counts(signals)), checks: 0 }
     }

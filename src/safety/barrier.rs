@@ -57,7 +57,6 @@ pub struct Limited {
 
 impl Limited {
     /// Returns whether any limit was active.
-    #[must_use]
     pub const fn any(self) -> bool {
         self.range || self.speed || self.torque || self.derated
     }
@@ -81,7 +80,6 @@ pub struct Barrier {
 
 impl Barrier {
     /// Derives the bounds from a joint's limits.
-    #[must_use]
     pub fn new(limits: &JointLimits) -> Self {
         let (braking, cap) = (limits.braking_acceleration().0, limits.torque_cap().0);
         let lead = braking * REACTION_S;
@@ -107,7 +105,6 @@ impl Barrier {
     /// Limits the requested torque so that the joint can still stop within its range, and returns the active
     /// limits. A joint that `returns` is outside its range: no torque drives it farther out, and a reduced
     /// one drives it back.
-    #[must_use]
     pub fn bound(
         &self,
         position: Radian,
@@ -146,14 +143,12 @@ impl Barrier {
     }
 
     /// Whether a joint stops before a fault of its range: `margin` beyond its ends, at its present velocity.
-    #[must_use]
     pub(crate) fn stops_in_range(&self, position: Radian, velocity: RadianPerSecond, margin: Radian) -> bool {
         let most = |end_is_at: f32| self.approach_speed(end_is_at + margin.0).0;
         velocity.0 <= most(self.high_rad - position.0) && -velocity.0 <= most(position.0 - self.low_rad)
     }
 
     /// Adds all values to a checksum, except those that derating changes.
-    #[must_use]
     pub(crate) fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad, .. } = *self;
         sum.numbers([low_rad, high_rad, speed_rad_per_s, damping_nm_s_per_rad]).numbers([
@@ -165,7 +160,6 @@ impl Barrier {
     }
 
     /// The torque that opposes the joint's velocity, under the cap.
-    #[must_use]
     pub(crate) fn damp(&self, velocity: RadianPerSecond) -> NewtonMetre {
         NewtonMetre(-self.damping_nm_s_per_rad * velocity.0).limited(NewtonMetre(self.cap_nm))
     }

@@ -16,7 +16,6 @@ pub(crate) struct CheckIns<const N: usize, const M: usize> {
 
 impl<const N: usize, const M: usize> CheckIns<N, M> {
     /// Starts from the current counts.
-    #[must_use]
     pub const fn new(counts: ([u32; N], [u32; M])) -> Self {
         Self { before: counts }
     }
@@ -45,7 +44,6 @@ pub(crate) struct TickGuard<const N: usize> {
 
 impl<const N: usize> TickGuard<N> {
     /// A guard before its first check.
-    #[must_use]
     pub const fn new() -> Self {
         Self { before: None }
     }

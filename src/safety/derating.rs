@@ -64,32 +64,27 @@ pub struct LimitCodes(u16);
 
 impl LimitCodes {
     /// Returns whether the set contains a code.
-    #[must_use]
     pub const fn contains(self, code: LimitCode) -> bool {
         self.0 & 1 << code as u8 != 0
     }
 
     /// Adds a code if `holds`.
-    #[must_use]
     pub const fn with(self, holds: bool, code: LimitCode) -> Self {
         Self(self.0 | (holds as u16) << code as u8)
     }
 
     /// Removes the codes of another set.
-    #[must_use]
     pub(crate) const fn without(self, others: Self) -> Self {
         Self(self.0 & !others.0)
     }
 
     /// Returns the code with the lowest number.
-    #[must_use]
     pub(crate) fn first(self) -> Option<LimitCode> {
         // Codes start at 1, so an empty set gives 15 or more, and no entry.
         LimitCode::ALL.get((self.0.trailing_zeros() as usize).wrapping_sub(1)).copied()
     }
 
     /// Codes of the limits that reduced a joint's request.
-    #[must_use]
     #[inline(never)]
     pub fn new<const N: usize>(
         limited: &Limited,
@@ -148,13 +143,11 @@ impl<const N: usize> Derating<N> {
         Self { bridge: 1.0, low: 1.0, high: 1.0, supply: [1.0; 2], joints: [JointShares::ALL; N] };
 
     /// Adds the shares of a torque that drives a joint and of one that a joint drives, by the supply current.
-    #[must_use]
     pub const fn with_supply(self, supply: [f32; 2]) -> Self {
         Self { supply, ..self }
     }
 
     /// Shares of a joint for a torque that drives it and for one that it drives.
-    #[must_use]
     pub(crate) fn shares(&self, joint: usize) -> [f32; 2] {
         let JointShares { winding, first_motion } = self.of_joint(joint);
         let both = self.bridge * winding * first_motion;
@@ -163,7 +156,6 @@ impl<const N: usize> Derating<N> {
     }
 
     /// Share of a joint's current until its rotor angle is proven.
-    #[must_use]
     pub(crate) fn first_motion(&self, joint: usize) -> f32 {
         self.of_joint(joint).first_motion
     }
@@ -182,14 +174,12 @@ pub(crate) struct Ramp {
 
 impl Ramp {
     /// A ramp with share 1 at `all` and 0 at `none`. Equal ends panic, in a constant at compile time.
-    #[must_use]
     pub const fn new(all: f32, none: f32) -> Self {
         assert!(all < none || none < all, "a ramp has two ends");
         Self { all, per_unit: 1.0 / (none - all) }
     }
 
     /// Remaining share at a value; 0 for NaN.
-    #[must_use]
     #[inline(never)]
     pub(crate) fn share(&self, value: f32) -> f32 {
         let taken = (value - self.all) * self.per_unit;
@@ -211,7 +201,6 @@ pub struct DeratingRamps {
 
 impl DeratingRamps {
     /// Creates the ramps from pairs of full share and none. Equal ends panic, in a constant at compile time.
-    #[must_use]
     pub const fn new(temperature_c: [f32; 2], low: [Volt; 2], high: [Volt; 2]) -> Self {
         Self {
             temperature_c: Ramp::new(temperature_c[0], temperature_c[1]),
@@ -221,7 +210,6 @@ impl DeratingRamps {
     }
 
     /// Shares at a temperature of the bridges (degrees Celsius) and a bus voltage, with those of each joint.
-    #[must_use]
     pub fn at<const N: usize>(&self, temperature_c: f32, bus: Volt, joints: [JointShares; N]) -> Derating<N> {
         Derating {
             bridge: self.temperature_c.share(temperature_c),

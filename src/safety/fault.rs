@@ -45,25 +45,21 @@ macro_rules! faults {
             pub const ALL: [Self; [$( $number, )*].len()] = [$( Self::$code, )*];
 
             /// Row in the catalogue of docs/safety.md; `-` for faults that prevent the board's start.
-            #[must_use]
             pub const fn catalogue(self) -> &'static str {
                 match self { $( Self::$code => $id, )* }
             }
 
             /// Word used in records.
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self { $( Self::$code => $name, )* }
             }
 
             /// Safe state that this fault leads to.
-            #[must_use]
             pub const fn reaction(self) -> Reaction {
                 match self { $( Self::$code => Reaction::$reaction, )* }
             }
 
             /// Description of the fault, as the end of a sentence about a joint or the board.
-            #[must_use]
             pub const fn words(self) -> &'static str {
                 match self { $( Self::$code => $words, )* }
             }
@@ -157,7 +153,6 @@ faults! {
 
 impl FaultCode {
     /// The number on the bus and in every record.
-    #[must_use]
     pub const fn number(self) -> u16 {
         self as u16
     }
@@ -190,7 +185,6 @@ listed! {
 
 impl NoticeCode {
     /// The number on the bus.
-    #[must_use]
     pub const fn number(self) -> u16 {
         self as u16
     }

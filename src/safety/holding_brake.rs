@@ -40,7 +40,6 @@ pub(crate) struct HoldingBrake {
 
 impl HoldingBrake {
     /// An engaged brake.
-    #[must_use]
     pub const fn new(delays: BrakeDelays) -> Self {
         Self {
             release_ticks: delays.release_ms as u32 * TICKS_PER_MS,
@@ -63,7 +62,6 @@ impl HoldingBrake {
     }
 
     /// Returns whether the brake has been released for the time it needs to open.
-    #[must_use]
     pub(crate) const fn is_open(&self) -> bool {
         self.on_ticks > self.release_ticks + 1
     }

@@ -101,7 +101,6 @@ listed! {
 impl InhibitReason {
     /// Fault that corresponds to the reason. `None` for an axis, which reports its own fault, and for
     /// storing and resetting, which were requested.
-    #[must_use]
     pub const fn code(self) -> Option<FaultCode> {
         Some(match self {
             Self::EmergencyStop => FaultCode::EmergencyStop,
@@ -124,7 +123,6 @@ impl InhibitReason {
     }
 
     /// Word used in records.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match (self, self.code()) {
             (Self::Axis1, _) => "axis_1",
@@ -137,13 +135,11 @@ impl InhibitReason {
     }
 
     /// Bit in the inhibit word.
-    #[must_use]
     pub const fn bit(self) -> u32 {
         1 << self as u8
     }
 
     /// Reason that an axis (from 0) sets for its own fault. Only a switching axis leads to braking.
-    #[must_use]
     pub(crate) const fn from_axis_fault(axis: usize, code: FaultCode, switching: bool) -> Self {
         match (code, axis) {
             (FaultCode::EncoderFrozen, _) if switching => Self::EncoderFrozen,
@@ -154,7 +150,6 @@ impl InhibitReason {
     }
 
     /// Bits of the reasons that no reset clears: another board, other constants or a new start are needed.
-    #[must_use]
     pub const fn for_ever() -> u32 {
         Self::Timers.bit() | Self::BoardVersion.bit() | Self::Configuration.bit()
     }
@@ -175,7 +170,6 @@ pub enum Bridges {
 impl Bridges {
     /// Derives the operation from the inhibit word. The bridges brake only where no other reason is set.
     #[inline(always)]
-    #[must_use]
     pub const fn from_causes(causes: u32) -> Self {
         if causes == 0 { Self::Follow } else { Self::while_inhibited(causes) }
     }

@@ -64,20 +64,17 @@ pub struct LimitsError {
 
 impl JointLimits {
     /// Largest torque that respects both the torque and the current limit.
-    #[must_use]
     pub fn torque_cap(&self) -> NewtonMetre {
         NewtonMetre(min(self.torque.0, self.current.0 * abs(self.torque_per_ampere.0)))
     }
 
     /// Assumed deceleration of the joint. A motion with less acceleration is never limited on its way to the
     /// end of the range.
-    #[must_use]
     pub(crate) fn braking_acceleration(&self) -> RadianPerSecondSquared {
         RadianPerSecondSquared(BRAKING_SHARE * self.torque_cap().0 / self.inertia.0)
     }
 
     /// Adds all values to a checksum.
-    #[must_use]
     pub(crate) fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { low, high, speed, torque, current, torque_per_ampere, inertia } = *self;
         sum.numbers([low.0, high.0, speed.0, torque.0, current.0, torque_per_ampere.0, inertia.0])
@@ -117,7 +114,6 @@ impl<const N: usize> Limits<N> {
     }
 
     /// Per joint, proximal first.
-    #[must_use]
     pub fn joints(&self) -> &[JointLimits; N] {
         &self.joints
     }

@@ -113,7 +113,6 @@ pub(crate) struct Monitor<const N: usize> {
 impl<const N: usize> Monitor<N> {
     /// A monitor for `rate_hz` decisions per second, 100..=6,400, so that 10 ms are 1 to 64 ticks. A rate
     /// outside is replaced by the nearest.
-    #[must_use]
     pub fn new(limits: Limits<N>, rate_hz: u32) -> Self {
         let rate_hz = rate_hz.clamp(100, 6400);
         let window_ticks = rate_hz * GLITCH_WINDOW_MS / 1000;
@@ -137,7 +136,6 @@ impl<const N: usize> Monitor<N> {
     }
 
     /// Checksum over all constants: limits, values derived from them, times.
-    #[must_use]
     pub(crate) fn checksum(&self) -> Checksum {
         let limits = self.limits.joints().iter().fold(Checksum::EMPTY, |sum, joint| joint.add_to(sum));
         let barriers = self.barriers.iter().fold(limits, |sum, barrier| barrier.add_to(sum));
@@ -173,13 +171,11 @@ impl<const N: usize> Monitor<N> {
     }
 
     /// Joints that are returning into their range.
-    #[must_use]
     pub(crate) fn returns(&self) -> [bool; N] {
         self.returns.map(|ends| ends.is_some() && self.state.is_enabled())
     }
 
     /// Codes of the limits that a decision applied to each joint.
-    #[must_use]
     pub(crate) fn limit_codes(&self, decision: &Decision<N>) -> [LimitCodes; N] {
         core::array::from_fn(|joint| {
             LimitCodes::new(&decision.limited[joint], &self.limits.joints()[joint], &self.derating, joint)
@@ -187,13 +183,11 @@ impl<const N: usize> Monitor<N> {
     }
 
     /// State of the drive.
-    #[must_use]
     pub fn state(&self) -> DriveState {
         self.state
     }
 
     /// Limits of each joint.
-    #[must_use]
     pub fn limits(&self) -> &Limits<N> {
         &self.limits
     }

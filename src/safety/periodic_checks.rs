@@ -42,13 +42,11 @@ listed! {
 
 impl BoardFault {
     /// Bit of the fault.
-    #[must_use]
     pub(crate) const fn bit(self) -> u32 {
         1 << self as u8
     }
 
     /// Code of the fault.
-    #[must_use]
     pub(crate) const fn code(self) -> FaultCode {
         match self {
             Self::CurrentTicks => FaultCode::CurrentTicks,
@@ -82,7 +80,6 @@ pub(crate) struct Due {
 
 impl CheckClock {
     /// A schedule for `rate_hz` rounds per second.
-    #[must_use]
     pub const fn new(rate_hz: u32) -> Self {
         Self { gate_rounds: rate_hz / 125, temperature_rounds: rate_hz / 20, round: 0 }
     }
@@ -101,7 +98,6 @@ impl CheckClock {
 
 /// Fault for a bridge's temperature, if any. Temperature and limit `hottest` in degrees Celsius; `None` for a
 /// thermistor that is open or shorted.
-#[must_use]
 pub(crate) fn of_temperature(degrees: Option<f32>, hottest: f32) -> Option<BoardFault> {
     match degrees {
         None => Some(BoardFault::Thermistor),

@@ -20,7 +20,6 @@ impl Refusal {
     pub(crate) const LEG: u8 = u8::MAX;
 
     /// Joint counted from 1; 0 for the leg.
-    #[must_use]
     pub const fn number(self) -> u8 {
         self.joint.wrapping_add(1)
     }
@@ -57,7 +56,6 @@ listed! {
 
 impl RefusalReason {
     /// Bit of this reason in 60FD.
-    #[must_use]
     pub const fn bit(self) -> u32 {
         1 << self as u8
     }

@@ -78,7 +78,6 @@ pub enum PowerRequest {
 
 impl PowerRequest {
     /// Returns whether the request is a step towards enabled.
-    #[must_use]
     pub(crate) const fn enables(self) -> bool {
         matches!(self, Self::Shutdown | Self::SwitchOn | Self::EnableOperation)
     }
@@ -108,7 +107,6 @@ pub enum Permission {
 
 impl DriveState {
     /// Operation that this state permits.
-    #[must_use]
     #[inline]
     pub const fn permission(self) -> Permission {
         match self {
@@ -119,14 +117,12 @@ impl DriveState {
     }
 
     /// Whether the joints follow their commands.
-    #[must_use]
     #[inline]
     pub const fn is_enabled(self) -> bool {
         matches!(self, Self::OperationEnabled)
     }
 
     /// The latched fault, or the one being reacted to.
-    #[must_use]
     pub const fn fault(self) -> Option<Fault> {
         match self {
             Self::FaultReactionActive { fault, .. } | Self::Fault { fault } => Some(fault),
@@ -135,7 +131,6 @@ impl DriveState {
     }
 
     /// State of a drive whose joints have no valid readings: off, and a fault stays until its reset.
-    #[must_use]
     pub const fn at_rest(self) -> Self {
         match self.fault() {
             Some(fault) => Self::Fault { fault },
@@ -144,7 +139,6 @@ impl DriveState {
     }
 
     /// The state after an event; damping lasts `damp_ticks`.
-    #[must_use]
     pub(crate) const fn after(self, event: Event, damp_ticks: u32) -> Self {
         match event {
             Event::Tick => self.after_tick(),

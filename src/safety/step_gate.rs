@@ -27,7 +27,6 @@ pub(crate) struct StepGate {
 
 impl StepGate {
     /// A gate that accepts up to `largest_step` counts between two ticks.
-    #[must_use]
     pub const fn new(largest_step: u32) -> Self {
         Self { largest_step, last: None, rejected: 0 }
     }

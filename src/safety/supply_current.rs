@@ -114,7 +114,6 @@ pub(crate) struct SupplyCurrent {
 
 impl SupplyCurrent {
     /// State without current.
-    #[must_use]
     pub fn new(limits: SupplyLimits) -> Self {
         let share = |limit: Option<Ampere>, share| limit.map_or(f32::INFINITY, |limit| share * limit.0);
         Self {
@@ -169,13 +168,11 @@ impl SupplyCurrent {
     }
 
     /// Least duty of the brake resistor.
-    #[must_use]
     pub(crate) fn brake_duty(&self) -> f32 {
         self.brake_duty
     }
 
     /// Shares of a torque that drives a joint and of one that a joint drives.
-    #[must_use]
     pub(crate) fn shares(&self) -> [f32; 2] {
         [self.draw.share, self.charge.share]
     }

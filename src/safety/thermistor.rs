@@ -35,7 +35,6 @@ pub struct Thermistor {
 
 impl Thermistor {
     /// Temperature of a code, degrees Celsius; `None` where the wire is open or shorted.
-    #[must_use]
     pub fn celsius(&self, code: u16) -> Option<f32> {
         if code <= SHORTED || code >= OPEN {
             return None;

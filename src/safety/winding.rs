@@ -53,7 +53,6 @@ pub struct WindingRating {
 impl WindingRating {
     /// Constants of a winding with this phase resistance at 20 degrees Celsius and this thermal resistance to
     /// ambient, K/W. Three phases take 1.5 R i^2.
-    #[must_use]
     pub fn new(resistance: Ohm, kelvin_per_watt: f32, time_s: f32, ambient_c: f32, limit_c: f32) -> Self {
         let hot = (COPPER_C + limit_c) / (COPPER_C + 20.0);
         Self { rise: kelvin_per_watt * 1.5 * resistance.0 * hot, time_s, ambient_c, limit_c }
@@ -71,7 +70,6 @@ pub(crate) struct Winding {
 
 impl Winding {
     /// A winding whose temperature is known, or one that is assumed warm.
-    #[must_use]
     pub fn new(rating: WindingRating, temperature_c: Option<f32>) -> Self {
         Self { rating, temperature_c: temperature_c.unwrap_or(rating.limit_c - RAMP_K), rest_c: 0.0 }
     }
@@ -91,7 +89,6 @@ impl Winding {
 
     /// Whether an assumption so many seconds ago does not matter any more: after three time constants 5 % of
     /// its error are left.
-    #[must_use]
     pub(crate) fn has_forgotten(&self, seconds: f32) -> bool {
         seconds > 3.0 * self.rating.time_s
     }
@@ -117,19 +114,16 @@ impl Winding {
     }
 
     /// Temperature, degrees Celsius.
-    #[must_use]
     pub fn temperature_c(&self) -> f32 {
         self.temperature_c
     }
 
     /// Whether the winding reached its limit; true for NaN.
-    #[must_use]
     pub(crate) fn is_too_hot(&self) -> bool {
         !(self.temperature_c < self.rating.limit_c)
     }
 
     /// Remaining share of the torque cap, 0..=1; 0 for NaN.
-    #[must_use]
     pub(crate) fn share(&self) -> f32 {
         clamp((self.rating.limit_c - self.temperature_c) / RAMP_K, 0.0, 1.0)
     }

@@ -44,7 +44,6 @@ pub enum ServoError {
 
 impl JointConfiguration {
     /// Limits in the form of the monitor.
-    #[must_use]
     pub fn limits(&self) -> JointLimits {
         JointLimits {
             low: self.low,
@@ -59,7 +58,6 @@ impl JointConfiguration {
 
     /// Stiffness (N m/rad) and damping (N m s/rad) of the position control: the largest that a host may ask
     /// of the joint, because the margins of the loop are proved for them.
-    #[must_use]
     pub fn stiffest_impedance(&self) -> [f32; 2] {
         let gains = ControllerGains::new(self.inertia, self.bandwidth, self.torque);
         [gains.stiffness_nm_per_rad(), gains.damping_nm_s_per_rad()]

@@ -45,7 +45,6 @@ pub(crate) struct ControllerGains {
 
 impl ControllerGains {
     /// Computes the gains for an inertia and a bandwidth; `cap` limits the integral.
-    #[must_use]
     pub fn new(inertia: KilogramMetreSquared, bandwidth: Hertz, cap: NewtonMetre) -> Self {
         let position_per_s = core::f32::consts::TAU * bandwidth.0 / BANDWIDTH_PER_GAIN;
         let damping_nm_s_per_rad = DAMPING_PER_GAIN * position_per_s * inertia.0;
@@ -59,27 +58,23 @@ impl ControllerGains {
     }
 
     /// Returns the gains of the same joint with another bandwidth.
-    #[must_use]
     pub(crate) fn with_bandwidth(&self, bandwidth: Hertz) -> Self {
         let inertia = self.damping_nm_s_per_rad / (DAMPING_PER_GAIN * self.position_per_s);
         Self::new(KilogramMetreSquared(inertia), bandwidth, NewtonMetre(self.cap_nm))
     }
 
     /// Adds all gains to a checksum.
-    #[must_use]
     pub(crate) fn add_to(&self, sum: Checksum) -> Checksum {
         let Self { position_per_s, damping_nm_s_per_rad, integral_nm_per_rad_s, cap_nm } = *self;
         sum.numbers([position_per_s, damping_nm_s_per_rad, integral_nm_per_rad_s, cap_nm])
     }
 
     /// Torque per velocity error, N m s/rad.
-    #[must_use]
     pub(crate) fn damping_nm_s_per_rad(&self) -> f32 {
         self.damping_nm_s_per_rad
     }
 
     /// Torque per position error without the integral, N m/rad.
-    #[must_use]
     pub(crate) fn stiffness_nm_per_rad(&self) -> f32 {
         self.damping_nm_s_per_rad * self.position_per_s
     }
@@ -93,7 +88,6 @@ pub struct Controller {
 
 impl Controller {
     /// Feedback torque for errors of position and velocity (commanded minus estimated).
-    #[must_use]
     pub(crate) fn torque(
         &self,
         gains: &ControllerGains,

@@ -32,14 +32,12 @@ impl<const N: usize> TorqueModel<N> for NoModel {
 
 /// Sign of a commanded velocity, smooth within [`COULOMB_BAND`]: `x (3 - x^2) / 2`, x = velocity / band,
 /// limited to -1 and 1 outside; value and slope are continuous.
-#[must_use]
 pub(crate) fn smoothed_sign(velocity: RadianPerSecond) -> f32 {
     let x = clamp(velocity.0 * (1.0 / COULOMB_BAND.0), -1.0, 1.0);
     x * (1.5 - 0.5 * x * x)
 }
 
 /// Torques of the model for a commanded motion, N m; zero without a model.
-#[must_use]
 pub(crate) fn feedforward_nm<const N: usize, M: TorqueModel<N>>(
     model: Option<&M>,
     motion: &MotionState<N>,

@@ -66,7 +66,6 @@ impl<const N: usize> LogAverager<N> {
     }
 
     /// Means of eight ticks, the last of which is `tick`.
-    #[must_use]
     pub(crate) fn means(&self, tick: u32, scales: &[JointScale; N]) -> LogSample<N> {
         const SHARE: f32 = 1.0 / TICKS_PER_LOG as f32;
         let mean_counts = |joint: usize| self.first[joint] as f32 + self.counts[joint] as f32 * SHARE;

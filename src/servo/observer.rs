@@ -42,7 +42,6 @@ pub(crate) struct ObserverGains {
 
 impl ObserverGains {
     /// Puts both poles at the given frequency; see the module's table.
-    #[must_use]
     pub fn new(bandwidth: Hertz) -> Self {
         let beta = exp(-core::f32::consts::TAU * bandwidth.0 * TICK_S);
         Self { position: 1.0 - beta * beta, velocity_per_s: (1.0 - beta) * (1.0 - beta) / TICK_S }
@@ -86,20 +85,17 @@ impl Observer {
     }
 
     /// Estimated position in counts; exact up to 2^24.
-    #[must_use]
     pub(crate) fn position_counts(&self) -> f32 {
         self.reading.unwrap_or(0) as f32 + self.deviation
     }
 
     /// Estimated position, rounded to a whole count.
-    #[must_use]
     pub(crate) fn nearest_counts(&self) -> i32 {
         let rounded = if self.deviation < 0.0 { self.deviation - 0.5 } else { self.deviation + 0.5 };
         self.reading.unwrap_or(0).wrapping_add(rounded as i32)
     }
 
     /// Estimated velocity, counts/s.
-    #[must_use]
     pub(crate) fn velocity_counts_per_s(&self) -> f32 {
         self.velocity_per_s
     }

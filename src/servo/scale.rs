@@ -28,25 +28,21 @@ pub struct JointScale {
 
 impl JointScale {
     /// Model angle for a position in counts, fractions allowed.
-    #[must_use]
     pub(crate) fn position(&self, counts: f32) -> Radian {
         Radian(self.anatomy.angle_to_chain(self.mounted(self.radian_per_count.0) * counts))
     }
 
     /// Model torque for a motor current.
-    #[must_use]
     pub(crate) fn torque(&self, current: Ampere) -> NewtonMetre {
         NewtonMetre(self.signed_torque_per_ampere().0 * current.0)
     }
 
     /// Model angle per count, of either sign.
-    #[must_use]
     pub fn signed_radian_per_count(&self) -> f32 {
         self.anatomy.to_chain(self.mounted(self.radian_per_count.0))
     }
 
     /// Model torque per motor current, of either sign.
-    #[must_use]
     pub(crate) fn signed_torque_per_ampere(&self) -> NewtonMetrePerAmpere {
         NewtonMetrePerAmpere(self.anatomy.to_chain(self.mounted(self.torque_per_ampere.0)))
     }

@@ -88,7 +88,6 @@ pub struct ServoOutput<const N: usize> {
 
 impl<const N: usize> ServoOutput<N> {
     /// Command for the drives.
-    #[must_use]
     pub fn drive(&self) -> &DriveCommand<N> {
         &self.decision.command
     }
@@ -161,7 +160,6 @@ impl<const N: usize> Servo<N> {
     }
 
     /// State of the drive.
-    #[must_use]
     pub fn state(&self) -> DriveState {
         self.monitor.state()
     }
@@ -176,7 +174,6 @@ impl<const N: usize> Servo<N> {
     }
 
     /// Checksum of gains, scales and limits. Only [`Self::set_bandwidths`] changes it.
-    #[must_use]
     pub(crate) fn checksum(&self) -> Checksum {
         self.joints.iter().fold(self.monitor.checksum(), |sum, joint| {
             let Joint { scale, count_per_radian, controller, configured, largest_acceleration_rad_per_s2 } =
@@ -190,19 +187,16 @@ impl<const N: usize> Servo<N> {
     }
 
     /// Damping of a joint's controller, N m s/rad; zero beyond the last joint.
-    #[must_use]
     pub(crate) fn damping(&self, joint: usize) -> f32 {
         self.joints.get(joint).map_or(0.0, |joint| joint.controller.damping_nm_s_per_rad())
     }
 
     /// Limits of each joint.
-    #[must_use]
     pub fn limits(&self) -> &Limits<N> {
         self.monitor.limits()
     }
 
     /// Conversion of each joint.
-    #[must_use]
     pub(crate) fn scales(&self) -> [JointScale; N] {
         self.joints.map(|joint| joint.scale)
     }

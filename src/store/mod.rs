@@ -88,13 +88,11 @@ pub struct Permit(());
 
 impl Permit {
     /// Returns a permit for a drive in this state; `None` where a bridge may switch.
-    #[must_use]
     pub fn from_state(state: DriveState) -> Option<Self> {
         Self::under(state.permission())
     }
 
     /// Returns a permit for a drive with this permission; `None` where a bridge may switch.
-    #[must_use]
     pub(crate) fn under(permission: Permission) -> Option<Self> {
         (permission == Permission::Off).then_some(Self(()))
     }

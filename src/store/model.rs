@@ -49,7 +49,6 @@ pub struct Provenance<const N: usize> {
 
 impl<const N: usize> Provenance<N> {
     /// Whether the identified leg was empty or worn, if known.
-    #[must_use]
     pub fn wearing(&self) -> Option<Wearing> {
         self.worn.map(|worn| if worn { Wearing::Worn } else { Wearing::Empty })
     }
@@ -83,7 +82,6 @@ const fn version_of(text: &[u8]) -> [u8; 3] {
 
 impl<const N: usize> ModelRecord<N> {
     /// Key under which the record is stored: a worn leg's model has its own.
-    #[must_use]
     pub fn key(&self) -> Key {
         match self.provenance.wearing() {
             Some(Wearing::Worn) => Key::WornModel,

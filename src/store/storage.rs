@@ -29,7 +29,6 @@ pub struct Storage<F: NorFlash, const N: usize> {
 
 impl<F: NorFlash, const N: usize> Storage<F, N> {
     /// Manager without pending results.
-    #[must_use]
     pub const fn new(store: Store<F>) -> Self {
         Self { store, accepted: [None; 2], calibrations: [None; N] }
     }

@@ -82,7 +82,6 @@ pub struct TestProblem {
 
 impl TestProblem {
     /// The function in `dimension` coordinates (2 where the function is one of a plane).
-    #[must_use]
     pub const fn new(function: TestFunction, dimension: usize) -> Self {
         use TestFunction::{Branin, BraninAsPrinted, CamelAsPrinted, SixHumpCamel};
         let planar = matches!(function, SixHumpCamel | Branin | CamelAsPrinted | BraninAsPrinted);
@@ -90,7 +89,6 @@ impl TestProblem {
     }
 
     /// Half the box's width: each coordinate reaches from minus to plus this value.
-    #[must_use]
     pub const fn half_width(&self) -> f64 {
         use TestFunction as F;
         match self.function {
@@ -104,7 +102,6 @@ impl TestProblem {
     }
 
     /// Least value in the box.
-    #[must_use]
     pub const fn minimum(&self) -> f64 {
         use TestFunction as F;
         match self.function {

@@ -33,13 +33,11 @@ pub struct InertiaWeight<T> {
 
 impl<T: Real> InertiaWeight<T> {
     /// One weight for all iterations; the paper's experiments use 0.8.
-    #[must_use]
     pub fn constant(weight: T) -> Self {
         Self { first: weight, last: weight, iterations: 1 }
     }
 
     /// Weight at an iteration.
-    #[must_use]
     pub fn at(&self, iteration: u32) -> T {
         if iteration >= self.iterations {
             return self.last;

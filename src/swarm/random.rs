@@ -20,7 +20,6 @@ pub struct Random(Xoshiro128PlusPlus);
 
 impl Random {
     /// Generator that starts from a seed.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(Xoshiro128PlusPlus::seed_from_u64(seed))
     }

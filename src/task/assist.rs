@@ -13,7 +13,6 @@ pub struct AssistLoop {
 
 impl AssistLoop {
     /// Assistance without a session.
-    #[must_use]
     pub const fn new(ends: AssistEnds<'static, JOINTS>) -> Self {
         Self { level: AssistLevel::new(), ends }
     }

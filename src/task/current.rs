@@ -30,7 +30,6 @@ pub static LOOPS: spin::Mutex<Option<&'static mut Current>> = spin::Mutex::new(N
 
 impl Current {
     /// Both axes off, on a board with this bus-voltage divider.
-    #[must_use]
     pub fn new(ends: CurrentEnds<'static, JOINTS>, divider: f32) -> Self {
         let [begin, full] = drives::chopper(divider);
         let chopper = if HAS_BRAKE_RESISTOR { Chopper::new(begin, full) } else { None };

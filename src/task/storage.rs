@@ -49,7 +49,6 @@ pub struct StorageTask {
 
 impl StorageTask {
     /// Creates the storage on this flash; `None` where its size is invalid, which no board of this kind has.
-    #[must_use]
     pub fn new(flash: SmallSectors, bytes: u32) -> Option<Self> {
         let store = Store::new(flash, 0..bytes).ok()?;
         let program = BoardProgram::new();

@@ -45,7 +45,6 @@ impl<'a> Line<'a> {
     }
 
     /// Kind of the record.
-    #[must_use]
     pub fn kind(&self) -> &'a str {
         self.kind
     }

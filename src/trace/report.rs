@@ -255,7 +255,6 @@ where
 }
 
 /// Word for a verdict.
-#[must_use]
 pub(crate) const fn judged(accepted: bool) -> &'static str {
     if accepted { "accepted" } else { "refused" }
 }

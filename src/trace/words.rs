@@ -9,7 +9,6 @@ use crate::leg::{
 };
 
 /// Word for the drive state.
-#[must_use]
 pub const fn drive(state: DriveState) -> &'static str {
     match state {
         DriveState::NotReadyToSwitchOn => "not_ready",
@@ -24,7 +23,6 @@ pub const fn drive(state: DriveState) -> &'static str {
 }
 
 /// Words for the activity and its phase (`-` without one), and the held-out motion from 1 (0 without one).
-#[must_use]
 pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
     match activity {
         Activity::Idle => ("idle", "-", 0),
@@ -51,7 +49,6 @@ pub const fn activity(activity: Activity) -> (&'static str, &'static str, u8) {
 }
 
 /// Words for the event of a session of assistance and for its reason.
-#[must_use]
 pub(crate) const fn assist(note: AssistNote) -> (&'static str, &'static str) {
     match note {
         AssistNote::Refused(why) => ("refused", why.name()),
@@ -60,7 +57,6 @@ pub(crate) const fn assist(note: AssistNote) -> (&'static str, &'static str) {
 }
 
 /// Word for the use of a logged sample, and the held-out motion from 1.
-#[must_use]
 pub const fn segment(segment: Option<Segment>) -> (&'static str, u8) {
     match segment {
         None => ("-", 0),
@@ -71,7 +67,6 @@ pub const fn segment(segment: Option<Segment>) -> (&'static str, u8) {
 }
 
 /// Word for a fault by which an axis turned its outputs off.
-#[must_use]
 pub const fn axis_fault(fault: AxisFault) -> &'static str {
     match fault {
         AxisFault::CurrentSense => "current_sense",
@@ -88,7 +83,6 @@ pub const fn axis_fault(fault: AxisFault) -> &'static str {
 }
 
 /// Word for the cause of a change, and the link of a payload from 1.
-#[must_use]
 pub(crate) const fn cause(cause: Cause) -> (&'static str, u8) {
     match cause {
         Cause::Payload { link } => ("payload", (link as u8).saturating_add(1)),
@@ -99,7 +93,6 @@ pub(crate) const fn cause(cause: Cause) -> (&'static str, u8) {
 }
 
 /// Unit of a parameter as one word.
-#[must_use]
 pub(crate) const fn unit(parameter: Parameter) -> &'static str {
     match parameter {
         Parameter::XX
@@ -117,7 +110,6 @@ pub(crate) const fn unit(parameter: Parameter) -> &'static str {
 }
 
 /// Word for the refusal of a calibration.
-#[must_use]
 pub const fn calibration(refusal: CalibrationRefusal) -> &'static str {
     use CalibrationRefusal as Why;
     match refusal {

@@ -28,7 +28,6 @@ fn bits(value: f32) -> u32 {
 }
 
 /// Checksum over sums, differences, products, quotients, comparisons and conversions.
-#[must_use]
 pub fn floats() -> u32 {
     let mut sum = 1;
     for a in FLOATS.map(core::hint::black_box) {
@@ -48,7 +47,6 @@ pub fn floats() -> u32 {
 }
 
 /// Checksum over arithmetic of 32 and 64 bits, divisions, shifts and counts.
-#[must_use]
 pub fn integers() -> u32 {
     let (mut sum, mut state) = (1, 0x9E37_79B9_7F4A_7C15_u64);
     for step in 0..200_u32 {

@@ -155,7 +155,6 @@ impl Adc {
     }
 
     /// Instant of the next event.
-    #[must_use]
     pub fn due(&self) -> Ticks {
         self.running.map_or(NEVER, |running| if running.code.is_none() { running.hold } else { running.end })
     }
@@ -211,7 +210,6 @@ impl Adc {
     }
 
     /// Whether this converter requests the common interrupt.
-    #[must_use]
     pub fn requests(&self) -> bool {
         let enabled = [(EOC, 5), (JEOC, 7), (1, 6), (OVR, 26)];
         enabled.into_iter().any(|(flag, bit)| self.sr & flag != 0 && self.cr[0] >> bit & 1 == 1)
@@ -296,7 +294,6 @@ pub struct Common {
 
 impl Common {
     /// Converters' clock for a clock of their bus, ticks of the model.
-    #[must_use]
     pub fn clock(&self, bus_hz: u64) -> Ticks {
         TICK_HZ / bus_hz * u64::from(2 + 2 * (self.control >> 16 & 3))
     }

@@ -108,7 +108,6 @@ pub struct Can {
 
 impl Can {
     /// A controller after power-on, with a partner of 1 Mbit/s.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             mcr: 0x1_0002,
@@ -132,7 +131,6 @@ impl Can {
     }
 
     /// Bit rate, bit/s.
-    #[must_use]
     pub fn rate(&self) -> u64 {
         let quanta = 3 + (self.btr >> 16 & 0xF) + (self.btr >> 20 & 7);
         self.bus_hz / (u64::from((self.btr & 0x3FF) + 1) * u64::from(quanta))
@@ -190,7 +188,6 @@ impl Can {
     }
 
     /// Instant of the next event.
-    #[must_use]
     pub fn due(&self) -> Ticks {
         self.on_wire.as_ref().map_or(NEVER, |(.., end)| *end).min(self.joins).min(self.recovers)
     }
@@ -289,7 +286,6 @@ impl Can {
     }
 
     /// Interrupt requests: transmission, queue 0, queue 1, status.
-    #[must_use]
     pub fn requests(&self) -> [bool; 4] {
         let queue = |index: usize, shift: u32| {
             let fifo = &self.fifos[index];

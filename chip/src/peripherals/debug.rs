@@ -11,7 +11,6 @@ pub const SYSTEM_MEMORY: u32 = 0x1FFF_0000;
 pub const SYSTEM_BYTES: usize = 0x8000;
 
 /// Content of the system memory of an ODrive v3.6-56V.
-#[must_use]
 pub fn system_memory() -> Vec<u8> {
     let mut bytes = vec![0xFF; SYSTEM_BYTES];
     // Factory version: major, minor, voltage.
@@ -40,13 +39,11 @@ pub struct Debug {
 
 impl Debug {
     /// State after power-on.
-    #[must_use]
     pub fn new() -> Self {
         Self { cycle: 21, ..Self::default() }
     }
 
     /// Cycle counter.
-    #[must_use]
     pub fn cycles(&self, now: Ticks) -> u32 {
         let running = self.trace && self.counts;
         if running { self.count.wrapping_add(((now - self.since) / self.cycle) as u32) } else { self.count }

@@ -58,13 +58,11 @@ impl Drivers {
     }
 
     /// Whether the gates follow their inputs.
-    #[must_use]
     pub const fn drive(&self) -> bool {
         self.enabled.is_some()
     }
 
     /// Gain of an axis' shunt amplifiers, V/V.
-    #[must_use]
     pub fn gain(&self, axis: usize) -> f64 {
         GAINS[usize::from(self.drivers[axis].registers[3] >> 2 & 3)]
     }

@@ -33,7 +33,6 @@ impl Exti {
     }
 
     /// Interrupt lines and their levels.
-    #[must_use]
     pub fn lines(&self) -> [(u8, bool); 7] {
         INTERRUPTS.map(|(interrupt, lines)| (interrupt, self.pending & self.mask & lines != 0))
     }

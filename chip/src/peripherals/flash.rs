@@ -91,7 +91,6 @@ pub struct Flash {
 
 impl Flash {
     /// Erased sectors; `noise` sets the state of cells after a power cut.
-    #[must_use]
     pub fn new(noise: Xoshiro256PlusPlus) -> Self {
         Self {
             access: 0,
@@ -132,7 +131,6 @@ impl Flash {
         &mut self.cells[range(region)]
     }
 
-    #[must_use]
     pub fn region(&self, region: &Region) -> &[u8] {
         &self.cells[range(region)]
     }

@@ -64,7 +64,6 @@ fn index(port: char) -> usize {
 
 impl Gpio {
     /// State after a reset.
-    #[must_use]
     pub fn new() -> Self {
         let mut gpio = Self { ports: [Port::default(); PORTS] };
         gpio.reset();
@@ -86,7 +85,6 @@ impl Gpio {
     }
 
     /// Mode of a pin.
-    #[must_use]
     pub fn mode(&self, (port, pin): Pin) -> Mode {
         let port = &self.ports[index(port)];
         match port.mode >> (2 * pin) & 3 {
@@ -98,13 +96,11 @@ impl Gpio {
     }
 
     /// Whether a pin is an output at high level.
-    #[must_use]
     pub fn is_driven_high(&self, pin: Pin) -> bool {
         self.mode(pin) == Mode::Output && self.ports[index(pin.0)].output >> pin.1 & 1 == 1
     }
 
     /// Whether neither processor nor board holds a pin's level. JTAG's pins, function 0, are not driven.
-    #[must_use]
     pub fn is_floating(&self, pin: Pin) -> bool {
         let port = &self.ports[index(pin.0)];
         let is_driven = matches!(self.mode(pin), Mode::Output) || port.driven >> pin.1 & 1 == 1;
@@ -128,7 +124,6 @@ impl Gpio {
     }
 
     /// Level of a pin as its input sees it.
-    #[must_use]
     pub fn level(&self, (port, pin): Pin) -> bool {
         self.ports[index(port)].inputs >> pin & 1 == 1
     }

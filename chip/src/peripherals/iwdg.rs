@@ -27,7 +27,6 @@ pub struct Iwdg {
 
 impl Iwdg {
     /// A stopped watchdog.
-    #[must_use]
     pub fn new() -> Self {
         Self { oscillator_hz: 32_000, reload: 0xFFF, count: 0xFFF, ..Self::default() }
     }
@@ -47,7 +46,6 @@ impl Iwdg {
     }
 
     /// Instant at which the watchdog resets the chip.
-    #[must_use]
     pub fn due(&self) -> Ticks {
         if self.runs { self.since + (self.count + 1) * self.step() } else { NEVER }
     }

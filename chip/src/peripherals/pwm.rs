@@ -32,7 +32,6 @@ pub struct Outputs {
 }
 
 /// Dead time of a register value, clocks of the dead-time generator (RM0090 17.4.18).
-#[must_use]
 pub fn dead_time(code: u32) -> u64 {
     let code = u64::from(code & 0xFF);
     match code >> 5 {
@@ -63,7 +62,6 @@ impl Outputs {
     }
 
     /// Levels of the pins at an instant up to which the outputs followed.
-    #[must_use]
     pub fn pins(&self, timer: &Timer, now: Ticks) -> [Pins; 3] {
         let dead = dead_time(timer.main_output()) * timer.dead_time_clock();
         core::array::from_fn(|channel| {
@@ -80,7 +78,6 @@ impl Outputs {
     }
 
     /// Next instant at which a pin may change.
-    #[must_use]
     pub fn next_change(&self, timer: &Timer, now: Ticks) -> Ticks {
         if !self.main {
             return NEVER;
@@ -100,7 +97,6 @@ impl Outputs {
     }
 
     /// Whether the main output is on.
-    #[must_use]
     pub const fn is_on(&self) -> bool {
         self.main
     }

@@ -75,7 +75,6 @@ pub struct Rcc {
 
 impl Rcc {
     /// State after power-on.
-    #[must_use]
     pub fn new() -> Self {
         let mut rcc = Self { supply_v: 3.3, crystal_works: true, ..Self::default() };
         rcc.reset(ResetReason::PowerOn);
@@ -95,12 +94,10 @@ impl Rcc {
     }
 
     /// Processor clock, ticks of the model.
-    #[must_use]
     pub fn cycle(&self) -> Ticks {
         TICK_HZ / self.processor_hz()
     }
 
-    #[must_use]
     pub fn processor_hz(&self) -> u64 {
         let divider = match self.configuration >> 4 & 0xF {
             code @ 8..=11 => 2 << (code - 8),
@@ -111,7 +108,6 @@ impl Rcc {
     }
 
     /// Clock of a peripheral bus (1 or 2), Hz.
-    #[must_use]
     pub fn bus_hz(&self, bus: u32) -> u64 {
         self.processor_hz() / self.bus_divider(bus)
     }
@@ -124,14 +120,12 @@ impl Rcc {
     }
 
     /// Clock of the timers on a peripheral bus, ticks of the model: twice the bus' clock if that is divided.
-    #[must_use]
     pub fn timer_cycle(&self, bus: u32) -> Ticks {
         let factor = if self.bus_divider(bus) == 1 { 1 } else { 2 };
         TICK_HZ / (factor * self.bus_hz(bus))
     }
 
     /// Whether the clock of a peripheral is enabled, by its enable register's offset and bit.
-    #[must_use]
     pub fn is_clocked(&self, register: u32, bits: u32) -> bool {
         let index = STORED.iter().position(|(offset, ..)| *offset == register);
         index.is_some_and(|index| self.stored[index] & bits != 0)

@@ -139,7 +139,6 @@ impl Spi {
     }
 
     /// Whether a frame is on the wire.
-    #[must_use]
     pub fn is_busy(&self, now: Ticks) -> bool {
         self.answer.is_some() && now < self.end
     }

@@ -78,7 +78,6 @@ pub struct CounterState {
 
 impl CounterState {
     /// First instant after the present count at which the phase becomes this one.
-    #[must_use]
     pub fn next(&self, phase: u64) -> Ticks {
         let left = if phase > self.phase { phase - self.phase } else { phase + self.period - self.phase };
         self.begun + left * self.length
@@ -121,7 +120,6 @@ pub struct Timer {
 
 impl Timer {
     /// A timer after a reset.
-    #[must_use]
     pub fn new(name: &'static str, kind: Kind) -> Self {
         let top = if kind == Kind::Wide { u32::MAX } else { 0xFFFF };
         let acting = Acting { top, ..Acting::default() };
@@ -144,7 +142,6 @@ impl Timer {
         }
     }
 
-    #[must_use]
     pub fn runs(&self) -> bool {
         self.cr1 & 1 == 1
     }
@@ -154,13 +151,11 @@ impl Timer {
     }
 
     /// Whether the counter follows an encoder.
-    #[must_use]
     pub fn follows_encoder(&self) -> bool {
         (1..=3).contains(&(self.smcr & 7))
     }
 
     /// Length of a count.
-    #[must_use]
     pub fn count_length(&self) -> Ticks {
         self.clock * (1 + u64::from(self.acting.prescaler))
     }
@@ -171,19 +166,16 @@ impl Timer {
     }
 
     /// Length of a period.
-    #[must_use]
     pub fn period_length(&self) -> Ticks {
         self.period() * self.count_length()
     }
 
     /// Value at which the counter turns around or starts again.
-    #[must_use]
     pub fn top(&self) -> u64 {
         self.acting.top.into()
     }
 
     /// Phase at an instant, counts.
-    #[must_use]
     pub fn phase(&self, now: Ticks) -> u64 {
         if !self.runs() || self.follows_encoder() {
             return self.phase;
@@ -192,13 +184,11 @@ impl Timer {
     }
 
     /// First instant after another at which the phase becomes this one.
-    #[must_use]
     pub fn next(&self, phase: u64, after: Ticks) -> Ticks {
         self.counter_state(after).next(phase)
     }
 
     /// State of a running counter at an instant, from which several instants are computed.
-    #[must_use]
     pub fn counter_state(&self, at: Ticks) -> CounterState {
         let (length, period) = (self.count_length(), self.period());
         let passed = (at - self.origin) / length;
@@ -234,7 +224,6 @@ impl Timer {
     }
 
     /// Phases at which a channel's reference rises and falls; `None` where it does not change.
-    #[must_use]
     pub fn edges(&self, channel: usize) -> Option<[u64; 2]> {
         let (compare, top) = (u64::from(self.acting.compare[channel]), self.top());
         if compare == 0 || compare >= top + u64::from(!self.is_centred()) {
@@ -250,7 +239,6 @@ impl Timer {
     }
 
     /// Levels of the references of channels 1 to 3 at an instant.
-    #[must_use]
     pub fn references(&self, now: Ticks) -> [bool; 3] {
         let phase = self.phase(now);
         let counter = u64::from(self.counter_of(phase));
@@ -269,25 +257,21 @@ impl Timer {
     }
 
     /// Enable and polarity bits of a channel's outputs.
-    #[must_use]
     pub fn outputs(&self, channel: usize) -> u32 {
         self.ccer >> (4 * channel) & 0xF
     }
 
     /// Register with dead time and main output.
-    #[must_use]
     pub fn main_output(&self) -> u32 {
         self.bdtr
     }
 
     /// Idle levels of a channel's two outputs.
-    #[must_use]
     pub fn idle_levels(&self, channel: usize) -> [bool; 2] {
         [8, 9].map(|bit| self.cr2 >> (bit + 2 * channel) & 1 == 1)
     }
 
     /// Share of a period in which a channel's reference is active; only PWM modes have one.
-    #[must_use]
     pub fn duty(&self, channel: usize) -> f64 {
         let counts = self.acting.top as f64 + f64::from(u8::from(!self.is_centred()));
         let below = (f64::from(self.acting.compare[channel]) / counts).clamp(0.0, 1.0);
@@ -300,13 +284,11 @@ impl Timer {
     }
 
     /// Acting compare value of a channel.
-    #[must_use]
     pub fn compare(&self, channel: usize) -> u32 {
         self.acting.compare[channel]
     }
 
     /// Length of the dead-time generator's clock.
-    #[must_use]
     pub fn dead_time_clock(&self) -> Ticks {
         self.clock << (self.cr1 >> 8 & 3).min(2)
     }
@@ -335,7 +317,6 @@ impl Timer {
     }
 
     /// Instant of the next event.
-    #[must_use]
     pub fn due(&self) -> Ticks {
         if !self.runs() || self.follows_encoder() {
             return NEVER;
@@ -432,7 +413,6 @@ impl Timer {
     }
 
     /// Whether the interrupt for updates, or the one for other events, is requested.
-    #[must_use]
     pub fn requests(&self) -> [bool; 2] {
         let raised = self.sr & self.dier;
         [raised & 1 != 0, raised & 0x1E != 0]
@@ -447,7 +427,6 @@ impl Timer {
     }
 
     /// Whether an enable of TIM1 starts this timer (trigger mode with internal trigger 0).
-    #[must_use]
     pub fn is_started_by_first(&self) -> bool {
         self.smcr & 0x77 == 6
     }

@@ -67,7 +67,6 @@ pub struct Axis {
 impl Axis {
     /// An axis without current, outputs off, with the rotor at `angle` (rad). Its own period began `quarter`
     /// quarters ago.
-    #[must_use]
     pub fn new(description: &AxisDescription, angle: f64, quarter: u32) -> Self {
         let electrical = electrical_angle(description, angle);
         let mut output_of = [0; 3];
@@ -112,37 +111,31 @@ impl Axis {
     }
 
     /// Reading of the absolute encoder at the rotor, 14 bits; `None` without one.
-    #[must_use]
     pub fn rotor_steps(&self) -> Option<u16> {
         self.description.counter.absolute.then(|| self.counter.steps(self.angle))
     }
 
     /// Electrical angle of the rotor, rad.
-    #[must_use]
     pub fn electrical_angle(&self) -> f64 {
         f64::from(self.description.motor.pole_pairs) * self.angle + self.description.motor.electrical_zero
     }
 
     /// Currents into the motor's phases, A.
-    #[must_use]
     pub fn currents(&self) -> [f64; 3] {
         self.motor.currents()
     }
 
     /// The motor.
-    #[must_use]
     pub fn motor(&self) -> &Motor {
         &self.motor
     }
 
     /// Description of this axis.
-    #[must_use]
     pub fn description(&self) -> &AxisDescription {
         &self.description
     }
 
     /// Rising less falling edges of the bridge between two instants of its period, s from now.
-    #[must_use]
     pub fn edges(&self, from: f64, to: f64) -> i32 {
         let now = f64::from(self.quarter) * QUARTER_S;
         self.bridge.edges(now + from, now + to)

@@ -102,7 +102,6 @@ const LONG: f64 = 1.0;
 
 impl Bridge {
     /// A bridge with outputs off, for a period of this length, s.
-    #[must_use]
     pub fn new(description: &BridgeDescription, period: f64) -> Self {
         let leg =
             HalfBridge { high: false, conducting: true, conducts_from: -LONG, edges: [f64::INFINITY; 2] };
@@ -165,7 +164,6 @@ impl Bridge {
     }
 
     /// Time of the next change, at most `end`.
-    #[must_use]
     pub fn next_edge(&self, end: f64) -> f64 {
         match self.schedule.first() {
             Some(event) if self.enabled => event.time.min(end),
@@ -174,7 +172,6 @@ impl Bridge {
     }
 
     /// Connection of an output since the last change, at this bus voltage.
-    #[must_use]
     pub fn output(&self, output: usize, bus: f64) -> Terminal {
         let Some(leg) = self.legs.get(output) else { return Terminal::Held(0.0) };
         if !self.enabled || !leg.conducting {
@@ -184,7 +181,6 @@ impl Bridge {
     }
 
     /// Time for which an output's low side has been conducting at `now`, s; `None` if it does not.
-    #[must_use]
     pub(crate) fn low_side_time(&self, output: usize, now: f64) -> Option<f64> {
         let leg = self.legs.get(output)?;
         (self.enabled && !leg.high && leg.conducts_from <= now).then_some(now - leg.conducts_from)
@@ -192,7 +188,6 @@ impl Bridge {
 
     /// Rising less falling edges between two instants of the period, s. An edge takes as long as the dead
     /// time: the current decides at which end of it the output switches.
-    #[must_use]
     pub fn edges(&self, from: f64, to: f64) -> i32 {
         let within = |edge: f64| i32::from(edge <= to && edge + self.description.dead_time >= from);
         let of_leg = |leg: &HalfBridge| within(leg.edges[0]) - within(leg.edges[1]);

@@ -48,7 +48,6 @@ pub struct CompleteDrives<const N: usize> {
 
 impl<const N: usize> CompleteDrives<N> {
     /// Drives with outputs off and rotors at rest at these angles, rad.
-    #[must_use]
     pub fn new(description: &CompleteDescription<N>, angles: &[f64; N], seed: u64) -> Self {
         let begins = core::array::from_fn(|axis| axis as u32 * description.shift_quarters % QUARTERS);
         Self {
@@ -115,7 +114,6 @@ impl<const N: usize> CompleteDrives<N> {
     }
 
     /// All axes.
-    #[must_use]
     pub fn axes(&self) -> &[Axis; N] {
         &self.axes
     }
@@ -128,7 +126,6 @@ impl<const N: usize> CompleteDrives<N> {
     }
 
     /// Supply of the drives.
-    #[must_use]
     pub fn supply(&self) -> &Supply {
         &self.supply
     }

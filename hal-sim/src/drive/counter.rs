@@ -26,7 +26,6 @@ pub struct Counter {
 
 impl Counter {
     /// A counter by its description, with the rotor at `angle`.
-    #[must_use]
     pub fn new(description: &CounterDescription, wiring: EncoderWiring, angle: f64) -> Self {
         let mut counter = Self { description: *description, wiring, turns: 0 };
         counter.turns = counter.index_turns(counter.seen(angle));
@@ -48,7 +47,6 @@ impl Counter {
     }
 
     /// Reading of an absolute encoder in the same chip, 14 bits.
-    #[must_use]
     pub fn steps(&self, angle: f64) -> u16 {
         steps(self.seen(angle) - self.description.index)
     }
@@ -72,7 +70,6 @@ impl Counter {
 }
 
 /// Angle as 14 bits of a turn.
-#[must_use]
 pub fn steps(angle: f64) -> u16 {
     (floor(angle / TAU * 16_384.0) & 0x3FFF) as u16
 }

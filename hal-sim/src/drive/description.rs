@@ -110,7 +110,6 @@ impl Default for ShuntDescription {
 impl ShuntDescription {
     /// Delay from the middle of the lower zero vector to the hold, s, for a trigger this number of timer
     /// clocks after that middle. The converter samples for three of its clocks of 21 MHz.
-    #[must_use]
     pub fn delay_of(trigger_clocks: f64) -> f64 {
         trigger_clocks / f64::from(BRIDGE_CLOCK_HZ) + 3.0 / 21e6
     }
@@ -264,7 +263,6 @@ pub struct CompleteDescription<const N: usize> {
 
 impl<const N: usize> CompleteDescription<N> {
     /// Axes half a period apart, as on the board, without coupling.
-    #[must_use]
     pub fn new(axes: [AxisDescription; N], supply: SupplyDescription) -> Self {
         Self { axes, supply, shift_quarters: SHIFT_QUARTERS, coupling: CouplingDescription::default() }
     }

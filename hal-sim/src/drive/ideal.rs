@@ -28,7 +28,6 @@ pub(crate) struct Drive {
 
 impl Drive {
     /// A drive without current, outputs off, for ticks of `tick` s.
-    #[must_use]
     pub fn new(description: &DriveDescription, tick: f64) -> Self {
         let remainder = if description.lag > 0.0 { exp(-tick / description.lag) } else { 0.0 };
         Self {
@@ -56,13 +55,11 @@ impl Drive {
     }
 
     /// Present motor current, A.
-    #[must_use]
     pub(crate) fn current(&self) -> f64 {
         self.current
     }
 
     /// Present torque at the joint, N m, anatomical sign.
-    #[must_use]
     pub fn torque(&self) -> f64 {
         self.torque_per_ampere * self.current
     }

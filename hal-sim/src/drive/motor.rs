@@ -50,14 +50,12 @@ pub struct Direction {
 
 impl Direction {
     /// Direction of an angle in rad.
-    #[must_use]
     pub fn from_angle(angle: f64) -> Self {
         let (sine, cosine) = sin_cos(angle);
         Self { cosine, sine }
     }
 
     /// Direction of a small angle (rad): exact to 1e-9 for 0.1 rad.
-    #[must_use]
     pub(crate) fn small(angle: f64) -> Self {
         let square = angle * angle;
         Self {
@@ -67,7 +65,6 @@ impl Direction {
     }
 
     /// This direction turned by another one's angle.
-    #[must_use]
     pub(crate) fn turned(&self, by: &Self) -> Self {
         Self {
             cosine: self.cosine * by.cosine - self.sine * by.sine,
@@ -138,7 +135,6 @@ pub struct Motor {
 impl Motor {
     /// A cold motor without current, rotor at `angle` (electrical); `on_resistance` of a switch is added to
     /// the winding's.
-    #[must_use]
     pub fn new(description: &MotorDescription, on_resistance: f64, angle: Direction) -> Self {
         let (along, across) = (1.0 / description.inductance_d, 1.0 / description.inductance_q);
         Self {
@@ -167,13 +163,11 @@ impl Motor {
     }
 
     /// Temperature of the winding, degrees Celsius.
-    #[must_use]
     pub fn temperature(&self) -> f64 {
         self.temperature
     }
 
     /// Code that a converter of 12 bits reads at the thermistor; `None` without one.
-    #[must_use]
     pub fn thermistor_code(&self) -> Option<u16> {
         let ThermistorDescription { pull_up, at_25_c, beta, .. } = self.description.thermistor?;
         let resistance = at_25_c * exp(beta * (1.0 / (self.sensed + 273.15) - 1.0 / 298.15));
@@ -181,26 +175,22 @@ impl Motor {
     }
 
     /// Resistance of a phase with its switch at the present temperature, ohm.
-    #[must_use]
     pub fn resistance(&self) -> f64 {
         self.resistance
     }
 
     /// Currents into the phases, A.
-    #[must_use]
     pub fn currents(&self) -> [f64; 3] {
         phases(&self.currents)
     }
 
     /// Amplitudes of the currents along and across the magnets' axis, A.
-    #[must_use]
     pub fn rotor_currents(&self) -> [f64; 2] {
         let ([along, across], Direction { cosine, sine }) = (self.currents, self.angle);
         [cosine * along + sine * across, cosine * across - sine * along]
     }
 
     /// Energy of the field that the currents produce, J.
-    #[must_use]
     pub fn field_energy(&self) -> f64 {
         let magnets = self.of_magnets(&self.angle);
         (0..2).map(|part| 0.75 * self.currents[part] * (self.flux[part] - magnets[part])).sum()
@@ -354,7 +344,6 @@ impl Motor {
 
     /// Cogging torque at a rotor angle (rad), N m: the negative slope of a potential, so it does no work over
     /// a turn.
-    #[must_use]
     pub fn cogging(&self, rotor: f64) -> f64 {
         if self.description.cogging == 0.0 {
             return 0.0;

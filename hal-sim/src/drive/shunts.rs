@@ -38,7 +38,6 @@ pub struct ShuntState {
 }
 
 /// Converts a voltage at the converter to its code.
-#[must_use]
 pub(crate) fn convert(volt: f64, error_codes: f64) -> u16 {
     nearest(volt / CONVERTER_VOLT * CODES + error_codes).clamp(0, CODES as i64 - 1) as u16
 }
@@ -58,7 +57,6 @@ impl ShuntDescription {
     }
 
     /// Current per code, A.
-    #[must_use]
     pub fn ampere_per_code(&self) -> f64 {
         CONVERTER_VOLT / CODES / (self.gain * self.resistance)
     }

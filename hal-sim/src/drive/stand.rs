@@ -115,7 +115,6 @@ pub struct Stand {
 
 impl Stand {
     /// Creates a stand with the rotor at rest at `angle` (rad), outputs off.
-    #[must_use]
     pub fn new(
         axis: &AxisDescription,
         supply: &SupplyDescription,
@@ -192,38 +191,32 @@ impl Stand {
     }
 
     /// Angle from the start (rad) and speed of the joint behind a gear.
-    #[must_use]
     pub fn joint(&self) -> Rotor {
         self.joint
     }
 
     /// Angle and speed of the rotor.
-    #[must_use]
     pub fn rotor(&self) -> Rotor {
         self.rotor
     }
 
     /// Mean torque on the rotor in the last period, N m.
-    #[must_use]
     pub fn torque(&self) -> f64 {
         self.torque
     }
 
     /// Present currents along and across the magnets' axis, A; the board has no sensor for them.
-    #[must_use]
     pub fn rotor_currents(&self) -> [f64; 2] {
         self.axis().motor().rotor_currents()
     }
 
     /// The axis.
-    #[must_use]
     pub fn axis(&self) -> &Axis {
         let [axis] = self.drives.axes();
         axis
     }
 
     /// Supply of the stand.
-    #[must_use]
     pub fn supply(&self) -> &Supply {
         self.drives.supply()
     }

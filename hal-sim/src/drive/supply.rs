@@ -41,7 +41,6 @@ pub struct SupplyEnergy {
 
 impl Supply {
     /// A bus at rest with a charged capacitor.
-    #[must_use]
     pub fn new(description: &SupplyDescription) -> Self {
         Self {
             description: *description,
@@ -52,19 +51,16 @@ impl Supply {
     }
 
     /// Bus voltage, V.
-    #[must_use]
     pub fn voltage(&self) -> f64 {
         self.voltage
     }
 
     /// Charge from the source since the start, C; its rate is the supply current.
-    #[must_use]
     pub fn source_charge(&self) -> f64 {
         self.source_charge
     }
 
     /// Energy totals since the start.
-    #[must_use]
     pub fn energy(&self) -> &SupplyEnergy {
         &self.energy
     }
@@ -104,7 +100,6 @@ impl Supply {
     }
 
     /// Converter code of the bus voltage.
-    #[must_use]
     pub fn code(&self, noise_codes: f64) -> u16 {
         convert(self.voltage / self.description.divider, noise_codes)
     }

@@ -52,19 +52,16 @@ pub struct Timing {
 
 impl Timing {
     /// From a tick on, permanently.
-    #[must_use]
     pub const fn from(begin: u64) -> Self {
         Self { begin, duration: u64::MAX, on: 1, off: 0 }
     }
 
     /// From a tick on, for a number of ticks.
-    #[must_use]
     pub const fn lasting(begin: u64, duration: u64) -> Self {
         Self { begin, duration, on: 1, off: 0 }
     }
 
     /// Whether the fault acts at a tick.
-    #[must_use]
     pub(crate) const fn holds(&self, tick: u64) -> bool {
         let Some(since) = tick.checked_sub(self.begin) else { return false };
         since < self.duration && (self.off == 0 || since % (self.on + self.off) < self.on)

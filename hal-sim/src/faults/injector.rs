@@ -85,7 +85,6 @@ const DUTY: [f64; 2] = [0.0, 1.0];
 
 impl Injector {
     /// An injector without faults.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self { slots: [None; MOST], generator: Xoshiro256PlusPlus::seed_from_u64(seed) }
     }
@@ -107,7 +106,6 @@ impl Injector {
     }
 
     /// Whether an event (contact or timing) is injected at this tick.
-    #[must_use]
     pub fn happens(&self, channel: Channel, joint: usize, tick: u64) -> bool {
         self.acts(channel, joint, tick, |_| true)
     }

@@ -32,7 +32,6 @@ pub struct WearerDescription {
 impl WearerDescription {
     /// Wearer with these segments (thigh, shank), muscles and cuffs, whose joint axes are the exoskeleton's.
     /// The delay of the reflexes is 70 ms, an assumption.
-    #[must_use]
     pub const fn aligned(
         [thigh, shank]: [SegmentDescription; 2],
         thigh_length: f64,
@@ -145,7 +144,6 @@ pub struct CuffDescription {
 impl CuffDescription {
     /// Tight padded cuff. It yields 13 mm across and 50 mm along under 100 N; assumptions about padding on
     /// soft tissue, to be varied.
-    #[must_use]
     pub const fn padded(distance: f64) -> Self {
         Self {
             distance,

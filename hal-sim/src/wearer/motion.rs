@@ -79,13 +79,11 @@ pub struct Strokes {
 
 impl Strokes {
     /// Kicks with the knee, one per second, at an angle of the hip (rad).
-    #[must_use]
     pub const fn kicking(hip: f64) -> Self {
         Self { postures: [[hip, 1.4], [hip, 0.35]], durations: [0.3, 0.05, 0.45, 0.2] }
     }
 
     /// Slow extensions of the knee while seated, one in five seconds, at an angle of the hip (rad).
-    #[must_use]
     pub const fn leg_extension(hip: f64) -> Self {
         Self { postures: [[hip, 1.5], [hip, 0.25]], durations: [1.5, 0.5, 2.0, 1.0] }
     }
@@ -166,7 +164,6 @@ fn movement(from: Pair, to: Pair, passed: f64, duration: f64) -> Intended {
 
 impl Gait {
     /// Walking in the air at strides per second with the published angles.
-    #[must_use]
     pub const fn at_cadence(cadence_hz: f64) -> Self {
         Self { cadence_hz, scale: [1.0; 2], offset: [0.0; 2], change: None }
     }

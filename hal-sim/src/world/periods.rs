@@ -61,7 +61,6 @@ impl<const N: usize> Electric<N> {
 impl<const N: usize> World<N> {
     /// A leg at rest at its anatomical zero, with complete drives and their bridges off. [`World::period`]
     /// moves it; commands to ideal drives have no effect.
-    #[must_use]
     pub fn with_complete_drives(
         description: &LegDescription<N>,
         drives: &CompleteDescription<N>,
@@ -129,7 +128,6 @@ impl<const N: usize> World<N> {
     }
 
     /// Reading of the absolute encoder at a joint, 14 bits; `None` without one.
-    #[must_use]
     pub fn joint_steps(&self, joint: usize) -> Option<u16> {
         let axis = self.electric.as_ref()?.drives.axes().get(joint)?;
         let encoder = axis.description().joint_encoder?;
@@ -139,7 +137,6 @@ impl<const N: usize> World<N> {
     }
 
     /// Complete drives, if present.
-    #[must_use]
     pub fn complete_drives(&self) -> Option<&CompleteDrives<N>> {
         self.electric.as_ref().map(|electric| &electric.drives)
     }

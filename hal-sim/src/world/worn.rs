@@ -33,7 +33,6 @@ impl<const N: usize> World<N> {
     }
 
     /// True state of the wearer now, if any.
-    #[must_use]
     pub fn wearer_truth(&self) -> Option<WearerTruth> {
         self.wearer.as_ref().map(|wearer| wearer.truth(&self.state))
     }

@@ -23,19 +23,16 @@ pub enum ToolError {
 
 impl ToolError {
     /// Bad input with a reason.
-    #[must_use]
     pub fn input(reason: impl Into<String>) -> Self {
         Self::Input(reason.into())
     }
 
     /// Exit code of the process.
-    #[must_use]
     pub fn exit_code(&self) -> u8 {
         if matches!(self, Self::Refused(_)) { EXIT_REFUSED } else { EXIT_INPUT }
     }
 
     /// Error of a file that cannot be written.
-    #[must_use]
     pub fn cannot_write(path: &Path, error: &dyn fmt::Display) -> Self {
         FileError::new(path.display(), format!("cannot be written: {error}")).into()
     }
@@ -55,19 +52,16 @@ pub struct FileError {
 
 impl FileError {
     /// Error of the whole file.
-    #[must_use]
     pub fn new(file: impl fmt::Display, reason: impl fmt::Display) -> Self {
         Self { file: file.to_string(), line: None, reason: reason.to_string() }
     }
 
     /// Error of a file that cannot be read.
-    #[must_use]
     pub fn unreadable(path: &Path, error: &std::io::Error) -> Self {
         Self::new(path.display(), format!("cannot be read ({error})"))
     }
 
     /// Error at a byte of the text.
-    #[must_use]
     pub(crate) fn at(file: &str, text: &str, start: Option<usize>, reason: String) -> Self {
         let line = |start| 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
         Self { file: file.to_owned(), line: start.map(line), reason }

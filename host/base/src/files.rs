@@ -23,7 +23,6 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
 
 /// Path without links, `.` and `..`, as far as its parts exist. All spellings of one file give the
 /// same result, whether it exists or not.
-#[must_use]
 pub fn resolved(path: &Path) -> PathBuf {
     let mut path = path.to_owned();
     for _ in 0..MOST_LINKS {
@@ -44,7 +43,6 @@ pub fn resolved(path: &Path) -> PathBuf {
 }
 
 /// Folder of a path.
-#[must_use]
 pub fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(parent) if parent.as_os_str().is_empty() => PathBuf::from("."),
@@ -54,7 +52,6 @@ pub fn folder_of(path: &Path) -> PathBuf {
 }
 
 /// Whether the path is a terminal, pipe or other device, which is written directly and may be shared.
-#[must_use]
 pub fn is_device(path: &Path) -> bool {
     OPEN_STREAMS.iter().any(|stream| path.starts_with(stream))
         || path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())

@@ -11,19 +11,16 @@ pub const BY_CARGO: &str = "--by-cargo";
 pub const VALIDATION_NAMES: [&str; VALIDATION_MOTIONS] = ["gait-6.5", "gait-3", "fourier"];
 
 /// Name of a parameter in reports.
-#[must_use]
 pub fn parameter_name(joint: usize, parameter: Parameter) -> String {
     format!("{}{}", parameter.symbol(), joint + 1)
 }
 
 /// Name of the static friction of a joint.
-#[must_use]
 pub fn surplus_name(joint: usize) -> String {
     format!("FS{}", joint + 1)
 }
 
 /// Name of an estimator.
-#[must_use]
 pub const fn estimator_name(estimator: Estimator) -> &'static str {
     match estimator {
         Estimator::Robust => "robust",
@@ -32,7 +29,6 @@ pub const fn estimator_name(estimator: Estimator) -> &'static str {
 }
 
 /// Name of a plan.
-#[must_use]
 pub const fn plan_name(plan: Plan) -> &'static str {
     match plan {
         Plan::OneTime => "one-time",
@@ -41,7 +37,6 @@ pub const fn plan_name(plan: Plan) -> &'static str {
 }
 
 /// Name of half the difference of Coulomb friction between the directions.
-#[must_use]
 pub fn asymmetry_name(joint: usize) -> String {
     format!("FCA{}", joint + 1)
 }

@@ -11,7 +11,6 @@ impl Number {
     pub const UNKNOWN: Self = Self(None);
 
     /// The number, if it is finite.
-    #[must_use]
     pub fn known(self) -> Option<f64> {
         self.0.filter(|value| value.is_finite())
     }
@@ -51,7 +50,6 @@ impl<'de> Deserialize<'de> for Number {
 }
 
 /// Formats a number with four significant digits, or a dash.
-#[must_use]
 pub fn number(value: Number) -> String {
     match value.known() {
         None => "-".into(),

@@ -16,7 +16,6 @@ pub fn print(text: &str) -> Result<(), ToolError> {
 }
 
 /// Text of a node, an adapter or a file as one line of a terminal: control characters are escaped.
-#[must_use]
 pub fn printable(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for letter in text.chars() {

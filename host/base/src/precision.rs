@@ -14,7 +14,6 @@ const ROUNDING_OF_PARAMETERS: f64 = 1e-9;
 const MOST_PLACES: i32 = 7;
 
 /// Formats the value of a parameter, rounded by its standard deviation.
-#[must_use]
 pub fn value(value: Number, sigma: Number) -> String {
     match (value.known(), places(sigma)) {
         (None, _) => "-".into(),
@@ -26,7 +25,6 @@ pub fn value(value: Number, sigma: Number) -> String {
 }
 
 /// Formats a standard deviation with two significant digits.
-#[must_use]
 pub fn sigma(sigma: Number) -> String {
     match (sigma.known(), places(sigma)) {
         (None, _) => "-".into(),
@@ -36,7 +34,6 @@ pub fn sigma(sigma: Number) -> String {
 }
 
 /// Formats a number with three significant digits.
-#[must_use]
 pub fn plain(value: Number) -> String {
     match value.known() {
         None => "-".into(),
@@ -50,7 +47,6 @@ pub fn plain(value: Number) -> String {
 }
 
 /// Formats an exact number, for example a limit: at most four significant digits, no trailing zeros.
-#[must_use]
 pub fn exact(value: Number) -> String {
     let Some(value) = value.known() else { return "-".into() };
     if value == 0.0 || (1e-4..1e6).contains(&value.abs()) {

@@ -9,7 +9,6 @@ pub struct Random(Xoshiro256PlusPlus);
 
 impl Random {
     /// Generator for one run of one row.
-    #[must_use]
     pub fn new(row: &str, seed: u64) -> Self {
         let name = row.bytes().fold(0, |name, byte| name << 8 | u64::from(byte));
         Self(Xoshiro256PlusPlus::seed_from_u64(seed ^ name << 32))

@@ -12,7 +12,6 @@ const DIGITS: usize = 12;
 
 /// Shortest decimal number of at most twelve digits within the rounding, else the value itself. `scale` is
 /// the magnitude of the numbers from which it was computed.
-#[must_use]
 pub fn without_noise(value: f64, scale: f64) -> f64 {
     let noise = NOISE * value.abs().max(scale);
     if value.abs() <= noise {
@@ -24,7 +23,6 @@ pub fn without_noise(value: f64, scale: f64) -> f64 {
 }
 
 /// Angle in radians without rounding: a right angle, which has no short decimal number, or a short number.
-#[must_use]
 pub fn without_noise_rad(angle: f64) -> f64 {
     let right = (angle / FRAC_PI_2).round() * FRAC_PI_2;
     if (angle - right).abs() <= NOISE { right } else { without_noise(angle, 1.0) }

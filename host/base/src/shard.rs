@@ -51,26 +51,22 @@ impl Shard {
     }
 
     /// Number of the shard, from 1.
-    #[must_use]
     pub const fn index(self) -> u64 {
         self.index
     }
 
     /// Number of all shards.
-    #[must_use]
     pub const fn count(self) -> u64 {
         self.count
     }
 
     /// Numbers, from 0, of the shard's runs among `runs`.
-    #[must_use]
     pub fn range(self, runs: usize) -> Range<usize> {
         let bound = |index: u64| (u128::from(index) * runs as u128 / u128::from(self.count)) as usize;
         bound(self.index - 1)..bound(self.index)
     }
 
     /// The shard's runs.
-    #[must_use]
     pub fn part<T>(self, runs: &[T]) -> &[T] {
         runs.get(self.range(runs.len())).unwrap_or_default()
     }

@@ -6,13 +6,11 @@ use crate::names::BY_CARGO;
 pub const ALIAS: &str = if cfg!(feature = "readers") { "cargo sim-readers" } else { "cargo sim" };
 
 /// Words that call this program again: the alias, or the name under which it was started.
-#[must_use]
 pub fn program() -> String {
     program_of(std::env::args_os().map(|word| word.to_string_lossy().into_owned()))
 }
 
 /// Words that call a program started with these words.
-#[must_use]
 pub fn program_of(words: impl IntoIterator<Item = String>) -> String {
     let mut words = words.into_iter();
     match (words.next(), words.next()) {
@@ -22,7 +20,6 @@ pub fn program_of(words: impl IntoIterator<Item = String>) -> String {
 }
 
 /// Quotes a word for a shell.
-#[must_use]
 pub fn quoted(word: &str) -> String {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./:=,+".contains(letter);
     if !word.is_empty() && word.chars().all(is_plain) {

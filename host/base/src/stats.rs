@@ -8,7 +8,6 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// Value below which this share of the list lies: its nearest element; NaN for an empty list.
-#[must_use]
 pub fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let index = (share * values.len().saturating_sub(1) as f64).round() as usize;

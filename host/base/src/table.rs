@@ -90,7 +90,6 @@ pub struct Table {
 
 impl Table {
     /// Table with a style in HTML.
-    #[must_use]
     pub fn with_class(class: &'static str) -> Self {
         Self { class: Some(class), ..Self::default() }
     }
@@ -103,25 +102,21 @@ impl Table {
     }
 
     /// Adds a column with the names of the rows.
-    #[must_use]
     pub fn label(self, head: impl Into<String>) -> Self {
         self.columns(Kind::Label, [head])
     }
 
     /// Adds columns of words.
-    #[must_use]
     pub fn text(self, heads: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.columns(Kind::Text, heads)
     }
 
     /// Adds columns of numbers.
-    #[must_use]
     pub fn numbers(self, heads: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.columns(Kind::Number, heads)
     }
 
     /// Adds columns of numbers that are shown under a condition; rows have their cells in any case.
-    #[must_use]
     pub fn numbers_if(mut self, is_shown: bool, heads: impl IntoIterator<Item = impl Into<String>>) -> Self {
         let before = self.columns.len();
         self = self.numbers(heads);
@@ -130,13 +125,11 @@ impl Table {
     }
 
     /// Adds a column of units.
-    #[must_use]
     pub fn unit(self) -> Self {
         self.columns(Kind::Unit, ["unit"])
     }
 
     /// Shows the last column in HTML only.
-    #[must_use]
     pub fn html_only(mut self) -> Self {
         if let Some(column) = self.columns.last_mut() {
             column.is_html_only = true;
@@ -145,7 +138,6 @@ impl Table {
     }
 
     /// Style of the last column's cells in HTML.
-    #[must_use]
     pub fn styled(mut self, class: &'static str) -> Self {
         if let Some(column) = self.columns.last_mut() {
             column.class = Some(class);
@@ -164,13 +156,11 @@ impl Table {
     }
 
     /// Whether the table has no row.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Renders plain text: the header, then one line per row.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let columns = self.widths(0);
         let mut text = String::new();
@@ -184,7 +174,6 @@ impl Table {
     }
 
     /// Renders Markdown with aligned columns, which a terminal shows well too.
-    #[must_use]
     pub fn to_markdown(&self) -> String {
         let columns = self.widths(LEAST_RULE);
         let rule = |(kind, width): &(Kind, usize)| match kind {
@@ -247,7 +236,6 @@ fn padded(cell: &str, (kind, width): (Kind, usize)) -> String {
 }
 
 /// Gives digits a true minus sign; an unknown number becomes a dash.
-#[must_use]
 pub fn typeset(digits: &str) -> String {
     match digits {
         "-" => "\u{2013}".into(),

@@ -9,7 +9,6 @@ use crate::error::FileError;
 const ALIKE: f64 = 0.8;
 
 /// Text as a TOML string, with quotation marks.
-#[must_use]
 pub fn quoted(text: &str) -> String {
     toml::Value::from(text).to_string()
 }
@@ -34,7 +33,6 @@ pub struct Fault {
 
 impl Fault {
     /// Error with the line of the value; a default has no line of its own, what contains it has.
-    #[must_use]
     pub fn in_file(self, file: &str, text: &str) -> FileError {
         FileError::at(file, text, locate(text, &self.steps), self.reason)
     }

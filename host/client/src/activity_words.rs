@@ -5,7 +5,6 @@ use scarab::leg::{Activity, AssistPhase, DriveState, IdentifyPhase, Step, VALIDA
 use scarab_base::names::VALIDATION_NAMES;
 
 /// Present activity.
-#[must_use]
 pub fn doing(activity: Activity, state: DriveState) -> String {
     match activity {
         Activity::Idle if state.is_enabled() => "holds its pose".into(),
@@ -32,7 +31,6 @@ pub fn doing(activity: Activity, state: DriveState) -> String {
 }
 
 /// Event that ends the present phase.
-#[must_use]
 pub const fn waits_for(activity: Activity, state: DriveState) -> &'static str {
     match state {
         DriveState::NotReadyToSwitchOn => "the first tick without a fault",
@@ -62,7 +60,6 @@ pub const fn waits_for(activity: Activity, state: DriveState) -> &'static str {
 }
 
 /// Reason why the drive is not enabled; empty while it is.
-#[must_use]
 pub fn not_enabled(state: DriveState) -> String {
     match (state.is_enabled(), state.fault()) {
         (true, _) => String::new(),

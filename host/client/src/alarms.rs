@@ -16,7 +16,6 @@ pub struct Alarms {
 }
 
 /// Reason of a refused step, by its bit of 60FD.
-#[must_use]
 pub fn reason(bit: u8) -> &'static str {
     use RefusalReason as Reason;
     match bit {
@@ -36,7 +35,6 @@ pub fn reason(bit: u8) -> &'static str {
 }
 
 /// Sentence about an emergency message; information: see `bus::device`.
-#[must_use]
 pub(crate) fn words(code: u16, information: [u8; 5]) -> String {
     let fault = FaultCode::ALL.into_iter().find(|fault| fault.number() == code);
     let notice = NoticeCode::ALL.into_iter().find(|notice| notice.number() == code);
@@ -67,7 +65,6 @@ impl Alarms {
     }
 
     /// Words of the newest active fault; `None` without one.
-    #[must_use]
     pub fn active_fault(&self) -> Option<&'static str> {
         let faults = || FaultCode::ALL.into_iter();
         let words = |(_, code, _): &(u16, u16, [u8; 5])| {

@@ -50,7 +50,6 @@ impl Patience {
     pub const REAL: Self = Self { answer: Duration::from_secs(6), repeat: Duration::from_secs(1) };
 
     /// One request, which must be answered in this time: a simulated bus loses none.
-    #[must_use]
     pub const fn once(answer: Duration) -> Self {
         Self { answer, repeat: answer }
     }
@@ -93,13 +92,11 @@ pub enum RequestError {
 
 impl RequestError {
     /// Whether the node aborted for this reason.
-    #[must_use]
     pub fn is(&self, abort: Abort) -> bool {
         *self == Self::Aborted(abort.code())
     }
 
     /// Error of the bus as a whole.
-    #[must_use]
     pub(crate) fn for_bus(self) -> ToolError {
         match self {
             Self::Failed(why) => ToolError::input(why),
@@ -108,7 +105,6 @@ impl RequestError {
     }
 
     /// Error with the node and the object.
-    #[must_use]
     pub(crate) fn for_object(self, node: u8, Object(index, sub): Object) -> ToolError {
         let why = match self {
             Self::Aborted(code) => format!("refused with abort code {code:08X}"),
@@ -125,7 +121,6 @@ impl RequestError {
     }
 
     /// Like `Self::for_object`; a node that aborts has refused.
-    #[must_use]
     pub fn refused(self, node: u8, object: Object) -> ToolError {
         match self {
             Self::Aborted(_) => ToolError::Refused(self.for_object(node, object).to_string()),

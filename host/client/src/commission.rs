@@ -182,7 +182,6 @@ fn calibration(axis: u32, reason: u32, detail: u32) -> String {
 
 impl<'a> Commission<'a> {
     /// Prepares the procedure; `say` shows a line to the operator.
-    #[must_use]
     pub fn new(client: Client, options: CommissionOptions, say: &'a mut dyn FnMut(&str)) -> Self {
         let joints = options.nodes.map(|node| JointCommissioned { node, ..JointCommissioned::default() });
         let report = CommissionReport { joints: joints.into(), ..CommissionReport::default() };

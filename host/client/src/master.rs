@@ -67,13 +67,11 @@ impl<B: Bus> Client<B> {
     }
 
     /// Present time of the bus.
-    #[must_use]
     pub(crate) fn now(&self) -> Duration {
         self.bus.now()
     }
 
     /// Whether a frame with this identifier was received.
-    #[must_use]
     pub(crate) fn has_heard(&self, identifier: u16) -> bool {
         self.heard.get(usize::from(identifier)).is_some_and(|heard| *heard)
     }

@@ -52,7 +52,6 @@ pub struct NodeIds {
 
 impl NodeIds {
     /// Uses this connection.
-    #[must_use]
     pub fn new(client: Client) -> Self {
         Self { client, identity: Identity::scarab(0, "") }
     }

@@ -14,7 +14,6 @@ const NS_PER_S: u64 = 1_000_000_000;
 const TAIL_BITS: u32 = 1 + 2 + 7 + 3;
 
 /// Number of bits of a frame on the wire, with stuffed bits and the following intermission.
-#[must_use]
 pub fn bits(frame: &Frame) -> u32 {
     let mut bits = vec![false];
     let mut push = |value: u32, count: u32| {
@@ -67,7 +66,6 @@ pub struct Mailbox {
 
 impl Mailbox {
     /// Creates the queue of a host's adapter.
-    #[must_use]
     pub fn in_order() -> Self {
         Self { in_order: true, ..Self::default() }
     }
@@ -83,20 +81,17 @@ impl Mailbox {
     }
 
     /// Occupied mailboxes of the controller, one bit each. A frame on the wire still occupies its own.
-    #[must_use]
     pub fn slots(&self) -> u32 {
         let slots = self.waiting.iter().map(|waiting| waiting.slot).chain(self.leaving);
         slots.fold(0, |bits, slot| bits | 1 << slot)
     }
 
     /// Number of waiting frames.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.waiting.len()
     }
 
     /// Whether no frame waits.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.waiting.is_empty()
     }
@@ -149,7 +144,6 @@ pub struct Wire {
 
 impl Wire {
     /// Creates an idle bus with this bit rate.
-    #[must_use]
     pub fn new(bits_per_s: u64) -> Self {
         Self { bit_ns: NS_PER_S / bits_per_s, free_ns: 0, moving: None, busy_ns: 0 }
     }
@@ -186,7 +180,6 @@ impl Wire {
     }
 
     /// Total time for which the bus was in use.
-    #[must_use]
     pub fn busy_ns(&self) -> u64 {
         self.busy_ns
     }

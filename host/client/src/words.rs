@@ -26,32 +26,27 @@ const STATES: [(u16, u16, &str, &str); 8] = [
 
 impl JointState {
     /// State in a statusword (6041); `None` if its bits are those of no state.
-    #[must_use]
     pub fn from_statusword(statusword: u16) -> Option<Self> {
         let index = STATES.iter().position(|(mask, value, ..)| statusword & mask == *value)?;
         Some(Self { index })
     }
 
     /// Name of the state.
-    #[must_use]
     pub fn name(self) -> &'static str {
         STATES[self.index].2
     }
 
     /// Event that ends the state.
-    #[must_use]
     pub fn waits_for(self) -> &'static str {
         STATES[self.index].3
     }
 
     /// Whether the joint is enabled.
-    #[must_use]
     pub fn is_enabled(self) -> bool {
         self.index == STATES.len() - 1
     }
 
     /// Whether the motors may be energised.
-    #[must_use]
     pub(crate) fn is_on(self) -> bool {
         matches!(
             self.name(),
@@ -60,14 +55,12 @@ impl JointState {
     }
 
     /// Whether the state is that of a fault.
-    #[must_use]
     pub fn has_fault(self) -> bool {
         self.index < 2
     }
 }
 
 /// What an enabled leg does, by the state and the motion of its identification (2100:2, 3) and its modes.
-#[must_use]
 pub fn doing(state: Option<u32>, motion: Option<u32>, modes: &[Option<i32>]) -> String {
     let phase = match (state, motion) {
         (Some(1), _) => IdentifyPhase::Approach,

@@ -63,7 +63,6 @@ pub fn axis_configuration(joint: &JointFile, motor: &MotorFile) -> AxisConfigura
 
 /// Calibration settings of a motor on its stand. The current is limited by the axis and by the resistance at
 /// the permitted voltage; the voltage follows from resistance and inductance.
-#[must_use]
 pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile) -> CalibrationSettings {
     let [usual, most] = CALIBRATION_VOLTAGE_V;
     let limit = f64::from(configuration.current_limit.0 / STRONG_SHARE);
@@ -81,7 +80,6 @@ pub fn calibration_settings(configuration: &AxisConfiguration, motor: &MotorFile
 }
 
 /// Motor on its stand, free of its gear, at rest with outputs off; the rotor started at `angle`, rad.
-#[must_use]
 pub(crate) fn rested(axis: &AxisDescription, supply: &SupplyDescription, angle: f64, seed: u64) -> Stand {
     let mut stand = Stand::new(axis, supply, ROTOR, angle, seed);
     // Cogging moves the rotor to a rest position.

@@ -67,7 +67,6 @@ pub fn write_log<const N: usize>(
 }
 
 /// Recording of samples of a log: anatomical angles and torques. `name` stands for the file.
-#[must_use]
 pub fn recorded<const N: usize>(name: &Path, leg: &LegFile, log: &[LoggedSample<N>]) -> Recording {
     let mut recording = Recording {
         file: name.to_owned(),

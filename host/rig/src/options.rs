@@ -19,7 +19,6 @@ pub enum DriveModel {
 
 impl DriveModel {
     /// Name in reports and options.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Ideal => "ideal",
@@ -59,7 +58,6 @@ pub struct SimulationOptions {
 
 impl SimulationOptions {
     /// Options for the unchanged leg file, with both seeds equal.
-    #[must_use]
     pub fn with_seed(seed: u64) -> Self {
         Self {
             seed,

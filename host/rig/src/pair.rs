@@ -107,13 +107,11 @@ impl<const N: usize, const B: usize> Context<N, B> {
     }
 
     /// Anatomical to D-H angles of every joint, as the firmware holds them.
-    #[must_use]
     pub(crate) fn anatomy(&self) -> [AnatomicalJoint<f64>; N] {
         self.configuration.joints.map(|joint| joint.scale.anatomy.convert())
     }
 
     /// Noise of each joint's current, A.
-    #[must_use]
     pub fn current_noise(&self, leg: &LegFile) -> [f64; N] {
         core::array::from_fn(|joint| self.noise[joint] / leg.joints[joint].torque_per_ampere)
     }
@@ -121,7 +119,6 @@ impl<const N: usize, const B: usize> Context<N, B> {
 
 /// Initial angles of the resting leg, rad: a tenth into the range. A leg whose lower end is the
 /// hanging position thus starts near it.
-#[must_use]
 pub fn start_position<const N: usize>(leg: &LegFile) -> [f64; N] {
     core::array::from_fn(|joint| {
         let [low, high] = leg.joints[joint].range_deg;
@@ -302,7 +299,6 @@ impl<const N: usize, const B: usize> Pair<N, B> {
     }
 
     /// Reason why the drive is no longer enabled.
-    #[must_use]
     pub fn stop_words(&self, leg: &LegFile) -> String {
         let Some((joint, fault)) = self.board.as_ref().and_then(|board| board.fault()) else {
             return drive_stop(leg, self.leg.control().state());

@@ -69,7 +69,6 @@ impl Joint {
     pub(crate) const ALL: [Self; 3] = [Self::Hip, Self::Knee, Self::Ankle];
 
     /// Name in files.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Hip => "hip",

@@ -124,7 +124,6 @@ impl FromStr for Perturbation {
 
 impl Perturbation {
     /// Whether the perturbation changes the identified values before their validation.
-    #[must_use]
     pub fn tampers(&self) -> bool {
         matches!(self, Self::Inertia(_) | Self::CentreOfMass(_))
     }

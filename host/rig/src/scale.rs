@@ -83,7 +83,6 @@ pub fn find_with<const N: usize, const B: usize>(
 }
 
 /// Solves the run again with corrected torques; `None` if no correction applies.
-#[must_use]
 pub fn corrected<const N: usize, const B: usize>(
     scale: &Scale<N, B>,
     context: &Context<N, B>,

@@ -42,7 +42,6 @@ pub(crate) struct Shaking<const N: usize> {
 
 impl<const N: usize> Shaking<N> {
     /// Begins without ticks.
-    #[must_use]
     pub fn new(anatomy: [AnatomicalJoint<f64>; N]) -> Self {
         let none = [0.0; N];
         let (window, largest, command, weight_nm) = (none, none, none, none);

@@ -159,7 +159,6 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
 
     /// Rows of a predicted motion with the noise-free torque; the last motion's are available once
     /// it is reported.
-    #[must_use]
     pub fn noise_free(&self, motion: usize) -> &[FilteredRows<f32, N, B>] {
         self.validation_rows.get(motion).map_or(&[], Vec::as_slice)
     }

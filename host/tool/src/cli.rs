@@ -144,7 +144,6 @@ next:
 ";
 
 /// Runs the tool on the process's arguments.
-#[must_use]
 pub fn main() -> ExitCode {
     let mut words: Vec<_> = std::env::args_os().collect();
     let is_by_cargo = words.get(1).is_some_and(|word| word == BY_CARGO);

@@ -26,7 +26,6 @@ struct Part {
 }
 
 /// Data sheet of a joint's node.
-#[must_use]
 pub fn text(joint: &str) -> String {
     let mut out = String::new();
     // Writing into a string does not fail.

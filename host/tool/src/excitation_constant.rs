@@ -7,7 +7,6 @@ use scarab::motion::HARMONICS;
 use scarab_identify::formats::excitation::Excitation;
 
 /// Source of a module with one constant, `EXCITATION`; depends only on `scarab::motion`.
-#[must_use]
 pub fn source(motion: &Excitation) -> String {
     let joints = motion.joints.len();
     let names: Vec<_> = motion.joints.iter().map(|joint| joint.name.as_str()).collect();

@@ -54,13 +54,11 @@ pub struct Band {
 
 impl Band {
     /// Quartiles over iterations, up to the length of the shortest curve.
-    #[must_use]
     pub fn over_iterations(curves: &[&[f64]]) -> Self {
         Self::new(curves, 1)
     }
 
     /// Quartiles over evaluations, one value per `STRIDE`.
-    #[must_use]
     pub fn over_evaluations(curves: &[&[f64]]) -> Self {
         Self::new(curves, STRIDE)
     }

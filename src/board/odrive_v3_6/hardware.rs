@@ -18,7 +18,6 @@ pub struct Odrive;
 
 impl Odrive {
     /// Creates the access and stores the gate drivers.
-    #[must_use]
     pub fn new(gate_drivers: GateDrivers) -> Self {
         if let Some(mut home) = GATE_DRIVERS.try_lock() {
             *home = Some(gate_drivers);

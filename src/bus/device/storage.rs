@@ -129,7 +129,6 @@ impl<const N: usize, const LOG: usize> Device<N, LOG> {
     }
 
     /// Returns the stored bit rate, kbit/s.
-    #[must_use]
     pub(crate) fn bit_rate(&self) -> Option<u16> {
         self.stored.iter().find_map(|stored| stored_bit_rate(stored.bytes()))
     }

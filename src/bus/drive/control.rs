@@ -113,7 +113,6 @@ pub struct AxisConstants {
 impl AxisConstants {
     /// Constants of a joint whose encoder has this many counts per motor revolution, behind this gear ratio.
     /// `current_bandwidth` is that of its current loop. All modes are supported.
-    #[must_use]
     pub fn new(
         joint: &JointConfiguration,
         counts_per_turn: u32,
@@ -363,7 +362,6 @@ const fn radian_per_second(micro: i32) -> RadianPerSecond {
 
 impl Axis {
     /// Creates the state after the start.
-    #[must_use]
     pub const fn new(constants: AxisConstants) -> Self {
         Self {
             constants,
@@ -422,13 +420,11 @@ impl Axis {
     }
 
     /// Returns object 2001; `None` if it is 0, the board's own.
-    #[must_use]
     pub(crate) const fn node_id(&self) -> Option<NodeId> {
         NodeId::new(self.settings.node_id)
     }
 
     /// Returns object 2002.
-    #[must_use]
     pub(crate) const fn bit_rate(&self) -> u16 {
         self.settings.bit_rate
     }
@@ -439,7 +435,6 @@ impl Axis {
     }
 
     /// Returns the bandwidths that a host has set (2021).
-    #[must_use]
     pub(crate) fn bandwidths(&self) -> LoopBandwidths {
         let set = |value: u16, unit: f32| (value > 0).then(|| Hertz(unit * f32::from(value)));
         LoopBandwidths {
@@ -449,7 +444,6 @@ impl Axis {
     }
 
     /// Returns object 2012.
-    #[must_use]
     pub(crate) const fn may_return(&self) -> bool {
         self.settings.returns
     }
@@ -473,13 +467,11 @@ impl Axis {
     }
 
     /// Returns the state of the leg's drive.
-    #[must_use]
     pub const fn drive(&self) -> DriveState {
         self.status.drive
     }
 
     /// Whether a host has sent a controlword other than 0 since the start or the last node reset.
-    #[must_use]
     pub(crate) const fn is_commanded(&self) -> bool {
         self.commanded
     }
@@ -628,7 +620,6 @@ impl Axis {
     }
 
     /// Returns object 6041.
-    #[must_use]
     pub(crate) fn statusword(&self) -> u16 {
         let status = &self.status;
         let bit = |is_set: bool, shift: u16| u16::from(is_set) << shift;
@@ -659,7 +650,6 @@ impl Axis {
     }
 
     /// Returns the command for the leg.
-    #[must_use]
     pub fn command(&self) -> JointCommand {
         let settings = &self.settings;
         let targets = self.targets;

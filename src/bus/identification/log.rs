@@ -86,19 +86,16 @@ impl<const N: usize, const L: usize> Log<N, L> {
     }
 
     /// Returns the number of held samples.
-    #[must_use]
     pub(crate) const fn held(&self) -> u32 {
         self.held as u32
     }
 
     /// Returns the number of waiting samples, held ones included.
-    #[must_use]
     pub(crate) const fn waiting(&self) -> u32 {
         self.length as u32
     }
 
     /// Returns the number of lost samples.
-    #[must_use]
     pub(crate) const fn lost(&self) -> u32 {
         self.lost
     }

@@ -81,7 +81,6 @@ pub(crate) struct LegObjects<const N: usize, const L: usize> {
 
 impl<const N: usize, const L: usize> LegObjects<N, L> {
     /// Creates the objects without a request; `checksum` is that of the running image.
-    #[must_use]
     pub const fn new(plan: Plan, seed: u64, generation: u32, checksum: u32) -> Self {
         Self {
             log: Log::EMPTY,
@@ -101,7 +100,6 @@ impl<const N: usize, const L: usize> LegObjects<N, L> {
     }
 
     /// Whether a request is pending that begins a motion.
-    #[must_use]
     pub(crate) fn requests_motion(&self) -> bool {
         matches!(self.requested, Some(LegCommand::Identify | LegCommand::Assist))
     }

@@ -24,7 +24,6 @@ pub struct ResultsCopy<const N: usize, const B: usize> {
 impl<const N: usize, const B: usize> ResultsCopy<N, B> {
     /// Empty results: before the first identification, or during one. A function and no constant, because a
     /// constant would place the whole value in flash.
-    #[must_use]
     pub const fn nothing() -> Self {
         Self {
             parameters: [[None; PARAMETERS_PER_JOINT]; N],

@@ -59,7 +59,6 @@ impl Mapped {
     }
 
     /// Whether the entry is a dummy: index 2 to 7, the standard's types. Its bytes are ignored.
-    #[must_use]
     pub(crate) const fn is_dummy(self) -> bool {
         self.object.index <= Type::U32 as u16
     }
@@ -80,7 +79,6 @@ pub(crate) struct Parameters {
 
 impl Parameters {
     /// Creates parameters with COB-ID, transmission type, inhibit time (units of 100 us) and mapped objects.
-    #[must_use]
     pub fn new(direction: Mapping, identifier: u16, kind: u8, inhibit: u16, mapped: &[u32]) -> Self {
         let mut map = [0; MAPPED];
         for (slot, entry) in map.iter_mut().zip(mapped) {
@@ -92,13 +90,11 @@ impl Parameters {
     }
 
     /// Returns the COB-ID, or `None` if the PDO does not exist.
-    #[must_use]
     pub(crate) fn identifier(&self) -> Option<u16> {
         (self.identifier & ABSENT == 0).then_some((self.identifier & 0x7FF) as u16)
     }
 
     /// Whether the PDO waits for a SYNC.
-    #[must_use]
     pub(crate) const fn is_synchronous(&self) -> bool {
         self.kind <= 240
     }
@@ -109,7 +105,6 @@ impl Parameters {
     }
 
     /// Length of the frame in bytes.
-    #[must_use]
     pub(crate) fn length(&self) -> usize {
         self.mapped().map(|mapped| usize::from(mapped.size)).sum()
     }

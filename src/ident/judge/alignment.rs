@@ -113,7 +113,6 @@ pub struct Alignment<T, const N: usize, const B: usize, const PENDING: usize> {
 
 impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T, N, B, PENDING> {
     /// Starts without data.
-    #[must_use]
     pub fn new() -> Self {
         let zero = T::zero();
         let row = HeldRow {
@@ -243,7 +242,6 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> Alignment<T,
 
     /// Errors found so far; call `Self::break_off` first to end the last motion. `None` for a direction
     /// that does not exist or that the parameters absorb.
-    #[must_use]
     pub fn misalignments(&self) -> Misalignments<T> {
         let (mut power, mut seen, mut along) =
             ([T::zero(); DIRECTIONS], [T::zero(); DIRECTIONS], [T::zero(); DIRECTIONS]);

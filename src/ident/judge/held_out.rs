@@ -21,7 +21,6 @@ pub struct HeldOut<T, const N: usize, const B: usize, const PENDING: usize> {
 
 impl<T: Real, const N: usize, const B: usize, const PENDING: usize> HeldOut<T, N, B, PENDING> {
     /// Starts without data; `reach` is that of the recorder's low-pass.
-    #[must_use]
     pub fn new(reach: usize) -> Self {
         Self {
             values: [T::zero(); B],
@@ -63,13 +62,11 @@ impl<T: Real, const N: usize, const B: usize, const PENDING: usize> HeldOut<T, N
     }
 
     /// Residual of the latest motion.
-    #[must_use]
     pub fn residual(&self) -> &Residual<T, N> {
         &self.residual
     }
 
     /// Geometry errors over all motions.
-    #[must_use]
     pub fn alignment(&self) -> &Alignment<T, N, B, PENDING> {
         &self.alignment
     }

@@ -92,14 +92,12 @@ impl<T: Real> JointResidual<T> {
     }
 
     /// Pairs of neighbouring blocks.
-    #[must_use]
     pub fn pairs(&self, forgiven: bool) -> u32 {
         self.judged(forgiven).pairs
     }
 
     /// Root mean square of the residual slower than half a second, N m; zero
     /// without correlation of neighbours.
-    #[must_use]
     pub fn slow(&self, forgiven: bool) -> T {
         let judged = self.judged(forgiven);
         let mean = judged.products / T::from_double(f64::from(judged.pairs.max(1)));
@@ -109,7 +107,6 @@ impl<T: Real> JointResidual<T> {
     /// Limit of [`Self::slow`] for noise alone, at a quantile of the standard normal distribution. `noise` is
     /// the standard deviation of a 500 Hz sample. Without it no disturbance is forgiven and the limit follows
     /// from the blocks' own scatter; with fewer than `quantile^2` pairs the result is then meaningless.
-    #[must_use]
     pub fn slow_by_chance(&self, quantile: T, noise: Option<T>) -> T {
         let judged = self.judged(noise.is_some());
         let pairs = T::from_double(f64::from(judged.pairs.max(1)));
@@ -166,7 +163,6 @@ pub struct Residual<T, const N: usize> {
 
 impl<T: Real, const N: usize> Residual<T, N> {
     /// Starts without data.
-    #[must_use]
     pub fn new() -> Self {
         Self { joints: [JointResidual::new(); N], longest_common_s: T::zero(), common: 0 }
     }

@@ -32,7 +32,6 @@ pub struct Baseline<T, const N: usize, const B: usize> {
 
 impl<T: Real, const N: usize, const B: usize> Baseline<T, N, B> {
     /// Builds the reference from the estimate, its record and the records that it was tested on.
-    #[must_use]
     pub fn new<'a>(
         estimate: Estimate<T, B>,
         training: &Record<T, N, B>,
@@ -51,14 +50,12 @@ impl<T: Real, const N: usize, const B: usize> Baseline<T, N, B> {
 
     /// Standard deviation of one independent row of a joint, N m: the weight that
     /// [`crate::ident::solve::estimate::Problem`] uses.
-    #[must_use]
     pub fn noise(&self, joint: usize) -> T {
         let variance = self.row_variance.get(joint).copied().unwrap_or(T::one());
         real::sqrt(variance / real::max(self.row_information, T::from_double(1e-3)))
     }
 
     /// Normalised square `e^2` of one joint's residual.
-    #[must_use]
     pub(crate) fn normalised_square(&self, rows: &FilteredRows<T, N, B>, joint: usize) -> T {
         let (Some(row), Some(&torque), Some(&variance)) =
             (rows.regressor.get(joint), rows.torque.get(joint), self.row_variance.get(joint))

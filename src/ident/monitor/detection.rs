@@ -84,7 +84,6 @@ impl<T: Real> Default for MonitorSettings<T> {
 
 impl<T: Real> MonitorSettings<T> {
     /// Energy up to which the sums do not grow: `rho ln rho / (rho - 1)`.
-    #[must_use]
     pub(crate) fn silent_energy(&self) -> T {
         self.energy_ratio * real::ln(self.energy_ratio) / (self.energy_ratio - T::one())
     }
@@ -132,7 +131,6 @@ pub struct Monitor<T, const N: usize> {
 
 impl<T: Real, const N: usize> Monitor<T, N> {
     /// Builds a monitor for rows that came through `low_pass`.
-    #[must_use]
     pub fn new<const TAPS: usize>(low_pass: &LowPass<T, TAPS>, settings: &MonitorSettings<T>) -> Self {
         let ratio = settings.energy_ratio;
         let blocks =
@@ -155,13 +153,11 @@ impl<T: Real, const N: usize> Monitor<T, N> {
     }
 
     /// Limit h of the sums.
-    #[must_use]
     pub fn limit(&self) -> T {
         self.limit
     }
 
     /// Current sum of each joint.
-    #[must_use]
     pub(crate) fn statistic(&self) -> [T; N] {
         self.charts.map(|chart| chart.sum)
     }

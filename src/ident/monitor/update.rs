@@ -99,7 +99,6 @@ pub struct Update<T, const N: usize, const B: usize> {
 
 impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
     /// Analyses the rows collected after the alarm; `silent_energy` is the right-hand side of (W7).
-    #[must_use]
     pub fn new(
         model: &RowModel<T, N, B>,
         baseline: &Baseline<T, N, B>,
@@ -165,13 +164,11 @@ impl<T: Real, const N: usize, const B: usize> Update<T, N, B> {
     }
 
     /// True if the updated model replaces the old one.
-    #[must_use]
     pub fn is_change(&self) -> bool {
         self.verdict.is_accepted() && self.cause != Cause::Nothing
     }
 
     /// Updated model with its uncertainty, if a change explains the rows; the noise is the old model's.
-    #[must_use]
     pub(crate) fn baseline(&self, before: &Baseline<T, N, B>) -> Option<Baseline<T, N, B>> {
         self.is_change().then(|| Baseline { estimate: self.estimate.clone(), ..before.clone() })
     }

@@ -14,7 +14,6 @@ pub enum Choice {
 
 impl Choice {
     /// True unless ruled out beforehand.
-    #[must_use]
     pub const fn is_possible(self) -> bool {
         !matches!(self, Self::Off)
     }

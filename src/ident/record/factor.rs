@@ -26,7 +26,6 @@ pub struct Factor<T, const B: usize> {
 
 impl<T: Real, const B: usize> Factor<T, B> {
     /// An empty factor.
-    #[must_use]
     pub fn new() -> Self {
         Self { r: [[T::zero(); B]; B], z: [T::zero(); B], residual: T::zero(), rows: 0 }
     }
@@ -97,7 +96,6 @@ impl<T: Real, const B: usize> Factor<T, B> {
     }
 
     /// `|R p - z|^2`: the cost above the least-squares optimum. Missing `parameters` count as zero.
-    #[must_use]
     pub fn excess(&self, parameters: &[T]) -> T {
         let count = parameters.len().min(B);
         let mut total = T::zero();
@@ -112,7 +110,6 @@ impl<T: Real, const B: usize> Factor<T, B> {
     }
 
     /// Converts to another precision.
-    #[must_use]
     pub fn convert<U: Real>(&self) -> Factor<U, B> {
         // Element by element: the compiler expands a large array by value at great cost.
         let mut converted = Factor::new();
@@ -128,25 +125,21 @@ impl<T: Real, const B: usize> Factor<T, B> {
     }
 
     /// Residual sum of squares at the least-squares optimum.
-    #[must_use]
     pub fn residual(&self) -> T {
         self.residual
     }
 
     /// The triangular matrix, `[row][column]`.
-    #[must_use]
     pub fn triangle(&self) -> &[[T; B]; B] {
         &self.r
     }
 
     /// The rotated right-hand side.
-    #[must_use]
     pub fn right(&self) -> &[T; B] {
         &self.z
     }
 
     /// Euclidean length of one column of all rows taken.
-    #[must_use]
     pub fn column_length(&self, column: usize) -> T {
         real::sqrt(
             self.r
@@ -158,7 +151,6 @@ impl<T: Real, const B: usize> Factor<T, B> {
 
     /// Restricts the problem: only `columns` are free, the others are held at `fixed`. Column `i` of the
     /// result is `columns[i]`.
-    #[must_use]
     #[inline(never)]
     pub(crate) fn restricted(&self, columns: &[usize], fixed: &[T; B], weight: T) -> Self {
         let mut result = Self::new();
@@ -182,7 +174,6 @@ impl<T: Real, const B: usize> Factor<T, B> {
     }
 
     /// Holds these columns at zero; the other columns keep their index.
-    #[must_use]
     #[inline(never)]
     pub(crate) fn without(&self, columns: &[bool; B]) -> Self {
         let mut result = Self::new();
@@ -201,13 +192,11 @@ impl<T: Real, const B: usize> Factor<T, B> {
     }
 
     /// Rows of this factor with zero on the right.
-    #[must_use]
     pub(crate) fn without_right(&self) -> Self {
         Self { z: [T::zero(); B], residual: T::zero(), ..self.clone() }
     }
 
     /// Rows of this factor with each right-hand side times `scale`, less the row times `shift`.
-    #[must_use]
     pub(crate) fn with_right(&self, scale: T, shift: &[T; B]) -> Self {
         let mut result = self.clone();
         for (right, row) in result.z.iter_mut().zip(&self.r) {
@@ -222,7 +211,6 @@ impl<T: Real, const B: usize> Factor<T, B> {
 
     /// Back substitution: the least-squares parameters of the first `count` columns; a column without
     /// information gives zero.
-    #[must_use]
     #[inline(never)]
     pub fn solve(&self, count: usize) -> [T; B] {
         let mut parameters = [T::zero(); B];
@@ -240,7 +228,6 @@ impl<T: Real, const B: usize> Factor<T, B> {
     }
 
     /// `R^-1` of the first `count` columns (upper triangular), zero where a diagonal is zero.
-    #[must_use]
     #[inline(never)]
     pub(crate) fn inverse(&self, count: usize) -> [[T; B]; B] {
         let count = count.min(B);

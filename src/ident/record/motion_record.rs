@@ -60,7 +60,6 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
     }
 
     /// Converts to another precision.
-    #[must_use]
     pub fn convert<U: Real>(&self) -> Record<U, N, B> {
         let convert = |value: T| U::from_double(value.to_double());
         Record {
@@ -81,14 +80,12 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
     }
 
     /// Standard deviation of one joint's filtered torque due to noise alone, N m; `None` if unknown.
-    #[must_use]
     pub fn filtered_noise(&self, joint: usize) -> Option<T> {
         let energy = self.row_information / T::from_double(DECIMATION as f64); // sum h^2
         self.noise.get(joint).filter(|&&noise| noise > T::zero()).map(|&noise| noise * real::sqrt(energy))
     }
 
     /// Root mean square torque error of one joint with these base parameters, N m; `None` without rows.
-    #[must_use]
     pub fn torque_error(&self, joint: usize, base: &[T; B]) -> Option<T> {
         let factor = self.factors.get(joint)?;
         let rows = *self.rows.get(joint)?;
@@ -122,7 +119,6 @@ pub struct Outliers<T, const N: usize> {
 
 impl<T: Real, const N: usize> Outliers<T, N> {
     /// Empty statistics.
-    #[must_use]
     pub(crate) fn none() -> Self {
         Self {
             samples: 0,
@@ -135,7 +131,6 @@ impl<T: Real, const N: usize> Outliers<T, N> {
     }
 
     /// Converts to another precision.
-    #[must_use]
     pub fn convert<U: Real>(&self) -> Outliers<U, N> {
         let convert = |value: T| U::from_double(value.to_double());
         Outliers {
@@ -165,25 +160,21 @@ pub struct Selection<T, const N: usize, const B: usize> {
 
 impl<T: Real, const N: usize, const B: usize> Selection<T, N, B> {
     /// Selection of all columns, before any decision.
-    #[must_use]
     pub fn all() -> Self {
         Self { is_made: false, dropped: [false; B], gain: [T::zero(); B], stribeck: [None; N] }
     }
 
     /// Number of base parameters held at zero.
-    #[must_use]
     pub fn dropped_count(&self) -> usize {
         self.dropped.iter().filter(|dropped| **dropped).count()
     }
 
     /// True if this parameter is held at zero.
-    #[must_use]
     pub(crate) fn drops(&self, model: &RowModel<T, N, B>, joint: usize, parameter: Parameter) -> bool {
         model.drive(joint, parameter).and_then(|base| self.dropped.get(base)).copied().unwrap_or(false)
     }
 
     /// Converts to another precision.
-    #[must_use]
     pub fn convert<U: Real>(&self) -> Selection<U, N, B> {
         let convert = |value: T| U::from_double(value.to_double());
         Selection {

@@ -19,7 +19,6 @@ pub const LARGEST_COLUMNS: usize = 32;
 pub type Row<T> = [T; LARGEST_COLUMNS + 1];
 
 /// Length of a factor of `columns`, in numbers.
-#[must_use]
 pub const fn size(columns: usize) -> usize {
     columns * (columns + 3) / 2 + 1
 }
@@ -69,7 +68,6 @@ pub fn rows<T: Real>(factor: &[T], columns: usize) -> impl Iterator<Item = (usiz
 }
 
 /// Residual sum of squares at the least-squares optimum.
-#[must_use]
 pub(crate) fn residual<T: Real>(factor: &[T], columns: usize) -> T {
     factor.get(size(columns) - 1).copied().unwrap_or(T::zero())
 }
@@ -89,7 +87,6 @@ pub fn merge<T: Real>(factor: &mut [T], other: &[T], columns: usize, weight: T) 
 }
 
 /// `|R p - z|^2 + residual`: sum of squares with these parameters.
-#[must_use]
 pub(crate) fn cost<T: Real>(factor: &[T], columns: usize, parameters: &[T]) -> T {
     let mut total = residual(factor, columns);
     for (column, row) in rows(factor, columns) {
@@ -105,7 +102,6 @@ pub(crate) fn cost<T: Real>(factor: &[T], columns: usize, parameters: &[T]) -> T
 
 /// Least squares by back substitution; a column without information gives zero. A column counts as one
 /// without information if its independent part is at most `share` of its length.
-#[must_use]
 pub fn solve<T: Real>(factor: &[T], columns: usize, share: T) -> [T; LARGEST_COLUMNS] {
     let mut parameters = [T::zero(); LARGEST_COLUMNS];
     let mut lengths = [T::zero(); LARGEST_COLUMNS];

@@ -75,7 +75,6 @@ impl<T: Real, const N: usize, const B: usize, const TAPS: usize, const PENDING: 
     }
 
     /// Row low-pass, the second filter.
-    #[must_use]
     pub(crate) fn low_pass(&self) -> &LowPass<T, TAPS> {
         &self.low_pass
     }
@@ -178,7 +177,6 @@ where
     }
 
     /// Delay of the smoothed motion behind the newest sample, in samples.
-    #[must_use]
     pub fn delay(&self) -> usize {
         self.smoothing.reach()
             + match self.estimator {
@@ -193,7 +191,6 @@ where
     }
 
     /// Taps of the low-pass to each side of a row's centre.
-    #[must_use]
     pub fn reach(&self) -> usize {
         self.low_pass.reach()
     }
@@ -337,7 +334,6 @@ where
     }
 
     /// Number of rows taken so far, per joint.
-    #[must_use]
     pub fn rows(&self) -> [u32; N] {
         self.rows
     }

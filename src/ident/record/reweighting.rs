@@ -68,7 +68,6 @@ pub(crate) fn weighted<T: Real, const N: usize, const B: usize, const NUMBERS: u
 }
 
 /// Weights of one joint's blocks; `information` is `m sum h^2`.
-#[must_use]
 pub(crate) fn weigh<T: Real, const N: usize, const B: usize, const NUMBERS: usize>(
     window: &Window<T, N, B, NUMBERS>,
     joint: usize,

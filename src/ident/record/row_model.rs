@@ -32,14 +32,12 @@ pub struct RowModel<T: Real, const N: usize, const B: usize> {
 }
 
 /// Zero Stribeck friction for all joints.
-#[must_use]
 pub fn no_stribeck<T: Real, const N: usize>() -> [Stribeck<T>; N] {
     [Stribeck { excess: T::zero(), velocity: T::one() }; N]
 }
 
 impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
     /// Builds a model without Stribeck friction.
-    #[must_use]
     pub fn new(chain: Chain<T, N>, gravity: Vector3<T>, base: BaseParameters<T, N, B>) -> Self {
         Self {
             chain,
@@ -63,7 +61,6 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
 
     /// Whether to search for Stribeck friction of a joint. With `auto` only where the encoder's pulses are
     /// much smaller than the speed of the slowest curve, else the pulses look like one.
-    #[must_use]
     pub fn stribeck_choice(&self, joint: usize) -> Choice {
         match self.stribeck_choice[joint] {
             Choice::Auto if self.pulse[joint] > T::from_double(LARGEST_PULSE) => Choice::Off,
@@ -72,7 +69,6 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
     }
 
     /// Base columns of every joint and its torque at one instant.
-    #[must_use]
     pub fn rows(&self, instant: &Smoothed<T, N>) -> FilteredRows<T, N, B> {
         let state = JointState { q: instant.position, qd: instant.velocity, qdd: instant.acceleration };
         let mut full = regressor(&self.chain, &state, &self.gravity);
@@ -102,7 +98,6 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
     }
 
     /// Index of the base parameter that stands for this parameter of a joint.
-    #[must_use]
     pub fn drive(&self, joint: usize, parameter: Parameter) -> Option<usize> {
         (0..self.base.rank()).find(|&base| self.base.independent(base) == Some((joint, parameter)))
     }

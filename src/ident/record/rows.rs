@@ -47,7 +47,6 @@ impl<T: Real, const N: usize, const B: usize> FilteredRows<T, N, B> {
     }
 
     /// True if all entries are finite.
-    #[must_use]
     pub fn is_finite(&self) -> bool {
         self.torque
             .iter()
@@ -108,13 +107,11 @@ pub struct RowFilter<T, const N: usize, const B: usize, const PENDING: usize> {
 
 impl<T: Real, const N: usize, const B: usize, const PENDING: usize> RowFilter<T, N, B, PENDING> {
     /// An empty filter.
-    #[must_use]
     pub fn new(ends: Ends) -> Self {
         Self { open: [Open::empty(); PENDING], age: None, oldest: 0, ends }
     }
 
     /// Open outputs that a kernel of `taps` weights needs.
-    #[must_use]
     pub(crate) const fn outputs_needed(taps: usize) -> usize {
         taps.div_ceil(DECIMATION)
     }

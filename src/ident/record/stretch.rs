@@ -53,7 +53,6 @@ pub struct Stretches<T, const N: usize, const B: usize> {
 
 impl<T: Real, const N: usize, const B: usize> Stretches<T, N, B> {
     /// Starts without rows; `values` are the base parameters found from this record.
-    #[must_use]
     pub fn new(model: &RowModel<T, N, B>, record: &Record<T, N, B>, values: &[T; B]) -> Self {
         let start = core::array::from_fn(|joint| {
             let size = record.torque[joint].root_mean_square;

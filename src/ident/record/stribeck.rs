@@ -83,7 +83,6 @@ pub struct StribeckFit<T, const B: usize> {
 
 impl<T: Real, const B: usize> StribeckFit<T, B> {
     /// Surplus FS - FC for these base parameters, N m.
-    #[must_use]
     pub fn surplus(&self, base: &[T; B]) -> T {
         self.slope.iter().zip(base).fold(self.constant, |sum, (&slope, &value)| sum - slope * value)
     }
@@ -99,7 +98,6 @@ impl<T: Real, const B: usize> StribeckFit<T, B> {
     }
 
     /// Converts to another precision.
-    #[must_use]
     pub fn convert<U: Real>(&self) -> StribeckFit<U, B> {
         let convert = |value: T| U::from_double(value.to_double());
         StribeckFit {
@@ -178,13 +176,11 @@ fn without_front<T: Real, const B: usize>(
 }
 
 /// Base columns without Stribeck friction: the part that the bank would explain stays in the residual.
-#[must_use]
 pub(crate) fn without_bank<T: Real, const B: usize>(joint: &JointRows<'_, T, B>) -> Factor<T, B> {
     without_front(&reordered::<T, B, 0>(joint, &[]), 0, joint.columns)
 }
 
 /// Base columns with the whole bank eliminated: unbiased with and without Stribeck friction.
-#[must_use]
 pub(crate) fn bank_eliminated<T: Real, const B: usize>(joint: &JointRows<'_, T, B>) -> Factor<T, B> {
     let unit = core::array::from_fn(|row| Combination {
         bank: core::array::from_fn(|column| if row == column { T::one() } else { T::zero() }),
@@ -283,7 +279,6 @@ pub(crate) struct Strongest<T> {
 
 /// Searches for Stribeck friction of one joint. `others` holds the rows of the other joints, weighted to
 /// chi-square units; `rank` is the number of base parameters.
-#[must_use]
 pub(crate) fn strongest<T: Real, const B: usize>(
     joint: &JointRows<'_, T, B>,
     others: &Factor<T, B>,
@@ -297,7 +292,6 @@ pub(crate) fn strongest<T: Real, const B: usize>(
 
 /// Returns the fit and the joint's factor with surplus and speed eliminated. `None` where gain and surplus
 /// are not both above `least`, or the problem is degenerate.
-#[must_use]
 pub(crate) fn eliminate<T: Real, const B: usize>(
     joint: &JointRows<'_, T, B>,
     found: &Strongest<T>,

@@ -51,13 +51,11 @@ pub struct Columns<const B: usize> {
 
 impl<const B: usize> Columns<B> {
     /// Base parameters, in the order of the factor's columns.
-    #[must_use]
     pub(crate) fn base(&self) -> &[usize] {
         self.base.get(..self.count).unwrap_or(&[])
     }
 
     /// Number of all columns, Stribeck columns included.
-    #[must_use]
     pub(crate) fn all(&self) -> usize {
         self.count + self.bank
     }
@@ -108,7 +106,6 @@ impl<const N: usize, const B: usize, const NUMBERS: usize> Window<f32, N, B, NUM
 
 impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N, B, NUMBERS> {
     /// Empty window without columns.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             columns: [Columns { base: [0; B], count: 0, friction: [None; 2], bank: 0, start: 0 }; N],
@@ -130,7 +127,6 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
     }
 
     /// Columns of each joint.
-    #[must_use]
     pub fn columns(&self) -> &[Columns<B>; N] {
         &self.columns
     }
@@ -307,20 +303,17 @@ impl<T: Real, const N: usize, const B: usize, const NUMBERS: usize> Window<T, N,
     }
 
     /// Number of blocks with rows, including the open one.
-    #[must_use]
     pub(crate) fn blocks(&self) -> usize {
         let open = self.capacity > 1 && self.joining.is_none() && self.outputs[self.slot(self.closed)] > 0;
         self.closed + usize::from(open)
     }
 
     /// Filter outputs in a block: its length at 50 Hz.
-    #[must_use]
     pub(crate) fn outputs(&self, block: usize) -> u32 {
         self.outputs[self.slot(block)]
     }
 
     /// One joint's part of a block, oldest block first.
-    #[must_use]
     pub(crate) fn part(&self, block: usize, joint: usize) -> Option<Part<'_, T>> {
         let columns = self.columns.get(joint)?;
         let start = self.slot(block) * self.stride + columns.start;

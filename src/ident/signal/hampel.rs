@@ -78,7 +78,6 @@ pub struct Hampel<T> {
 
 impl<T: Real> Hampel<T> {
     /// A filter without samples.
-    #[must_use]
     pub fn new(quantity: Quantity) -> Self {
         Self {
             quantity,

@@ -86,25 +86,21 @@ impl<T: Real, const TAPS: usize> LowPass<T, TAPS> {
     }
 
     /// Taps to each side of the centre; the output belongs to the sample this many before the newest.
-    #[must_use]
     pub const fn reach(&self) -> usize {
         self.reach
     }
 
     /// Number of weights, `2 reach + 1`.
-    #[must_use]
     pub const fn taps(&self) -> usize {
         2 * self.reach + 1
     }
 
     /// Weights, oldest sample first.
-    #[must_use]
     pub fn weights(&self) -> &[T] {
         &self.weights[..self.taps()]
     }
 
     /// Sum of the squared weights: the share of a white noise's variance that remains.
-    #[must_use]
     pub fn energy(&self) -> T {
         self.energy
     }
@@ -173,20 +169,17 @@ impl<T: Real, const TAPS: usize> Kernel<T, TAPS> {
     }
 
     /// Taps to each side of the centre.
-    #[must_use]
     pub const fn reach(&self) -> usize {
         self.low_pass.reach()
     }
 
     /// Number of weights of each of the three filters.
-    #[must_use]
     pub const fn taps(&self) -> usize {
         self.low_pass.taps()
     }
 
     /// Value, slope (1/s) and curvature (1/s^2) at the centre of a window of [`Self::taps`] samples. The
     /// window comes in two pieces, oldest first, as a ring buffer holds them.
-    #[must_use]
     pub fn apply(&self, older: &[T], newer: &[T], centre: T) -> (T, T, T) {
         // Differences from the centre: large constants cancel before they cost digits.
         let (mut value, mut slope, mut curvature) = (T::zero(), T::zero(), T::zero());

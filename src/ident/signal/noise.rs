@@ -114,7 +114,6 @@ pub(crate) struct NoiseLevel<T> {
 
 impl<T: Real> NoiseLevel<T> {
     /// Starts without data.
-    #[must_use]
     pub fn new() -> Self {
         Self { last: [T::zero(); 3], filled: 0, scatter: Median::new() }
     }
@@ -136,7 +135,6 @@ impl<T: Real> NoiseLevel<T> {
     }
 
     /// Standard deviation of the noise of one sample; zero before the fifth difference.
-    #[must_use]
     pub(crate) fn sigma(&self) -> T {
         self.scatter.value().map_or(T::zero(), |median| median / T::from_double(0.674_490 * 4.472_136))
     }

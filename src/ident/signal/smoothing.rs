@@ -32,7 +32,6 @@ pub struct Smoother<T, const N: usize, const TAPS: usize> {
 
 impl<T: Real, const N: usize, const TAPS: usize> Smoother<T, N, TAPS> {
     /// An empty window.
-    #[must_use]
     pub fn new() -> Self {
         Self { positions: [[T::zero(); TAPS]; N], torques: [[T::zero(); TAPS]; N], next: 0, filled: 0 }
     }

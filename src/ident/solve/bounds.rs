@@ -80,7 +80,6 @@ impl<T: Real> Interval<T> {
 
 impl<T: Real> LinkPrior<T> {
     /// Converts to another precision.
-    #[must_use]
     pub fn convert<U: Real>(&self) -> LinkPrior<U> {
         let convert = |value: T| U::from_double(value.to_double());
         LinkPrior {
@@ -143,7 +142,6 @@ impl<T: Real> LinkPrior<T> {
 }
 
 /// Search box of the base parameters.
-#[must_use]
 pub(crate) fn search_box<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     record: &Record<T, N, B>,
@@ -177,7 +175,6 @@ fn ranges<T: Real, const N: usize, const B: usize>(
 
 /// Smallest and largest values that a prior allows for the single parameters. The box of the base parameters
 /// is made from these ranges.
-#[must_use]
 pub fn parameter_box<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     prior: &[LinkPrior<T>; N],
@@ -223,7 +220,6 @@ pub(super) fn measured_box<T: Real, const N: usize, const B: usize>(
 }
 
 /// All fourteen parameters of every joint, at the prior's values.
-#[must_use]
 pub fn prior_parameters<T: Real, const N: usize>(prior: &[LinkPrior<T>; N]) -> LegParameters<T, N> {
     core::array::from_fn(|joint| {
         let link = &prior[joint];

@@ -41,7 +41,6 @@ listed! {
 const WEAK_SHARE: f64 = 0.02;
 
 /// True if the data hardly separate base parameter `base` from the others.
-#[must_use]
 pub(crate) fn is_weak<T: Real, const N: usize, const B: usize>(
     record: &Record<T, N, B>,
     estimate: &Estimate<T, B>,
@@ -55,7 +54,6 @@ pub(crate) fn is_weak<T: Real, const N: usize, const B: usize>(
 }
 
 /// Status of one parameter.
-#[must_use]
 pub fn status<T: Real, const N: usize, const B: usize>(
     model: &RowModel<T, N, B>,
     record: &Record<T, N, B>,

@@ -25,7 +25,6 @@ pub struct ParameterBox<T, const B: usize> {
 /// Parameters in the box with the smallest `|R p - z|^2`, for the first `count` columns.
 ///
 /// Parameters without information get the value nearest to zero in the box.
-#[must_use]
 pub fn least_squares_in_box<T: Real, const B: usize>(
     factor: &Factor<T, B>,
     count: usize,

@@ -42,7 +42,6 @@ const DETERMINED_SHARE: f64 = 1e-4;
 const SMALLEST_NOISE_SHARE: f64 = 1e-5;
 
 /// Standard deviation of one independent row of each joint, N m.
-#[must_use]
 pub fn noise<T: Real, const N: usize, const B: usize>(record: &Record<T, N, B>) -> [T; N] {
     core::array::from_fn(|joint| {
         let factor = &record.factors[joint];
@@ -91,19 +90,16 @@ impl<T: Real, const B: usize> Stage<T, B> {
     }
 
     /// Base parameters that this stage determines.
-    #[must_use]
     pub fn columns(&self) -> &[usize] {
         self.columns.get(..self.count).unwrap_or(&[])
     }
 
     /// Number of base parameters that were open in this stage.
-    #[must_use]
     pub(crate) fn requested(&self) -> usize {
         self.requested
     }
 
     /// Cost in chi-square units, column `i` being base parameter `columns()[i]`.
-    #[must_use]
     pub fn factor(&self) -> &Factor<T, B> {
         &self.factor
     }
@@ -112,7 +108,6 @@ impl<T: Real, const B: usize> Stage<T, B> {
     /// `None` without columns.
     ///
     /// Power iteration on `S'S` and on its inverse, forty rounds each: a lower bound, within a few percent.
-    #[must_use]
     pub fn condition(&self) -> Option<T> {
         if self.count == 0 {
             return None;
@@ -186,13 +181,11 @@ pub struct Estimate<T, const B: usize> {
 
 impl<T: Real, const B: usize> Estimate<T, B> {
     /// Estimate without any determined parameter.
-    #[must_use]
     pub fn nothing() -> Self {
         Self { values: [T::zero(); B], covariance: [[T::zero(); B]; B], determined: [false; B] }
     }
 
     /// Standard deviation of one base parameter; `None` where not determined.
-    #[must_use]
     pub fn sigma(&self, index: usize) -> Option<T> {
         let determined = self.determined.get(index).copied().unwrap_or(false);
         let variance = self.covariance.get(index)?.get(index)?;
@@ -200,13 +193,11 @@ impl<T: Real, const B: usize> Estimate<T, B> {
     }
 
     /// Standard deviation of the weighted sum of base parameters.
-    #[must_use]
     pub fn sigma_of(&self, weights: &[T; B]) -> T {
         real::sqrt(variance(&self.covariance, weights))
     }
 
     /// Number of base parameters that the data determine.
-    #[must_use]
     pub fn rank(&self) -> usize {
         self.determined.iter().filter(|determined| **determined).count()
     }
@@ -215,7 +206,6 @@ impl<T: Real, const B: usize> Estimate<T, B> {
 impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
     /// Root mean square torque error of one joint that the parameters' covariance
     /// explains, N m: `tr(R Cov R') / rows`.
-    #[must_use]
     #[inline(never)]
     pub(crate) fn uncertainty(&self, joint: usize, estimate: &Estimate<T, B>) -> T {
         let (Some(factor), Some(&rows)) = (self.factors.get(joint), self.rows.get(joint)) else {
@@ -246,7 +236,6 @@ pub struct Problem<'a, T: Real, const N: usize, const B: usize> {
 
 impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
     /// Problem of `record` for the base parameters of `model`.
-    #[must_use]
     pub fn new(record: &'a Record<T, N, B>, model: &RowModel<T, N, B>) -> Self {
         let mut owner = [0; B];
         for (base, slot) in owner.iter_mut().enumerate() {
@@ -258,13 +247,11 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
     }
 
     /// Standard deviation of one independent row of each joint, N m.
-    #[must_use]
     pub fn noise(&self) -> &[T; N] {
         &self.noise
     }
 
     /// All joints' rows, weighted: chi-square units. Columns held at zero are empty.
-    #[must_use]
     pub fn weighted(&self) -> Factor<T, B> {
         let mut all = Factor::new();
         for (factor, &sigma) in self.record.factors.iter().zip(&self.noise) {
@@ -277,13 +264,11 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
     }
 
     /// All weighted rows as one stage over all base parameters.
-    #[must_use]
     pub fn whole(&self) -> Stage<T, B> {
         Stage::new(&self.weighted(), T::one(), &self.free, &[T::zero(); B])
     }
 
     /// Number of stages of a plan.
-    #[must_use]
     pub(crate) const fn stages(plan: Plan) -> usize {
         match plan {
             Plan::OneTime => 1,
@@ -292,7 +277,6 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
     }
 
     /// One stage of a plan; parameters determined by earlier stages are held at `values`.
-    #[must_use]
     pub(crate) fn stage(
         &self,
         plan: Plan,
@@ -318,7 +302,6 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
     }
 
     /// The least-squares estimate of a plan, in closed form.
-    #[must_use]
     pub fn least_squares(&self, plan: Plan) -> Estimate<T, B> {
         let mut estimate = Estimate::nothing();
         for index in 0..Self::stages(plan) {

@@ -59,7 +59,6 @@ impl<T: Real> ConstantRatio<T> {
     /// True if the two runs differ by the stated mass at the stated position, within noise; only noise is
     /// tolerated. A link assumed 5 % too long makes a constant 4.5 % wrong and adds at most 90 units of
     /// chi-square, where correct runs have eight.
-    #[must_use]
     pub fn is_consistent(&self) -> bool {
         let freedom = T::from_double(f64::from(self.freedom));
         let spread = real::sqrt(freedom + freedom);
@@ -67,7 +66,6 @@ impl<T: Real> ConstantRatio<T> {
     }
 
     /// True if the mass is heavy enough to determine this joint's constant.
-    #[must_use]
     pub fn is_determined(&self) -> bool {
         self.ratio > T::zero() && self.sigma <= T::from_double(LARGEST_SIGMA_SHARE) * self.ratio
     }
@@ -75,7 +73,6 @@ impl<T: Real> ConstantRatio<T> {
 
 /// Assumed over true torque constant of one joint, from a record without and one with a load of base
 /// parameters `load`; `None` where the load has no effect on the joint.
-#[must_use]
 #[inline(never)]
 pub fn torque_constant_ratio<T: Real, const N: usize, const B: usize>(
     without: &Record<T, N, B>,
@@ -165,7 +162,6 @@ impl<T: Real, const N: usize, const B: usize> Record<T, N, B> {
     /// Converts the record to true torque constants without the load of base parameters `load`: torque over
     /// `ratios` (assumed over true constant of each joint), less the load's. A record stores only the value
     /// of the mean absolute torque; it is assumed to change in proportion to the root mean square.
-    #[must_use]
     pub fn corrected(&self, ratios: &[T; N], load: &[T; B]) -> Self {
         let mut record = self.clone();
         for (joint, (factor, &ratio)) in record.factors.iter_mut().zip(ratios).enumerate() {

@@ -213,25 +213,21 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
     }
 
     /// Current state of the search.
-    #[must_use]
     pub fn state(&self) -> SearchState {
         self.state
     }
 
     /// Cost of the current stage's best above that stage's least-squares optimum, chi-square units.
-    #[must_use]
     pub fn stage_excess(&self) -> Option<T> {
         self.swarm.as_ref().and_then(Search::best).map(|best| best.value)
     }
 
     /// Largest cost at which a stage ended above its least-squares optimum, chi-square units.
-    #[must_use]
     pub(crate) fn excess(&self) -> T {
         self.excess
     }
 
     /// Base parameters found so far: closed stages, and the best of the open one.
-    #[must_use]
     pub fn values(&self) -> [T; B] {
         let mut values = self.values;
         if let Some(best) = self.swarm.as_ref().and_then(Search::best) {
@@ -243,19 +239,16 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
     }
 
     /// Iterations of all stages.
-    #[must_use]
     pub fn iterations(&self) -> u32 {
         self.iterations
     }
 
     /// Evaluations of all stages.
-    #[must_use]
     pub fn evaluations(&self) -> u32 {
         self.evaluations
     }
 
     /// Seed of the first stage.
-    #[must_use]
     pub fn seed(&self) -> u64 {
         self.seed
     }

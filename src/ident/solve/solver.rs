@@ -57,7 +57,6 @@ pub struct Solver<T: Real, const N: usize, const B: usize> {
 impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     /// Solves in closed form and prepares the swarm. Where columns may be dropped, [`Self::advance`] solves
     /// again after the selection.
-    #[must_use]
     pub fn new(
         model: &RowModel<T, N, B>,
         record: Record<T, N, B>,
@@ -108,7 +107,6 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     }
 
     /// True when the selection of columns has ended, or no column may be dropped.
-    #[must_use]
     pub fn is_selected(&self) -> bool {
         self.record.selection.is_made
     }
@@ -174,7 +172,6 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
 
     /// Cost of the search's end above least squares, chi-square units; zero where the box keeps it away from
     /// least squares, whose values then count. `None` until the result is complete.
-    #[must_use]
     pub(crate) fn search_excess(&self) -> Option<T> {
         self.completed.as_ref()?;
         Some(if self.is_inside() { self.search.excess() } else { T::zero() })
@@ -204,19 +201,16 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     }
 
     /// Record of the motion identified from.
-    #[must_use]
     pub fn record(&self) -> &Record<T, N, B> {
         &self.record
     }
 
     /// Plan: one-time or sequential.
-    #[must_use]
     pub fn plan(&self) -> Plan {
         self.plan
     }
 
     /// Closed-form estimate.
-    #[must_use]
     pub fn least_squares(&self) -> &Estimate<T, B> {
         &self.least_squares
     }
@@ -228,19 +222,16 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     }
 
     /// Swarm search.
-    #[must_use]
     pub fn search(&self) -> &SwarmSearch<T, B> {
         &self.search
     }
 
     /// Search box of the swarm.
-    #[must_use]
     pub fn bounds(&self) -> &ParameterBox<T, B> {
         &self.bounds
     }
 
     /// Condition number of the scaled weighted problem.
-    #[must_use]
     pub fn condition(&self) -> Option<T> {
         self.condition
     }
@@ -252,25 +243,21 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     }
 
     /// Base values of the consistent leg; until it is complete, those of the swarm.
-    #[must_use]
     pub fn found(&self) -> [T; B] {
         self.completed.as_ref().map_or_else(|| self.search.values(), |(values, _)| *values)
     }
 
     /// Base values to judge: the result, or those of [`Self::examine`].
-    #[must_use]
     pub fn values(&self) -> [T; B] {
         self.given.unwrap_or_else(|| self.found())
     }
 
     /// Estimate to judge: [`Self::values`] with the covariance of the problem.
-    #[must_use]
     pub fn estimate(&self) -> Estimate<T, B> {
         Estimate { values: self.values(), ..self.least_squares.clone() }
     }
 
     /// Stribeck friction of each joint for the judged base values, as a factor on its Coulomb friction.
-    #[must_use]
     pub fn stribeck(&self, model: &RowModel<T, N, B>) -> [Stribeck<T>; N] {
         let values = self.values();
         let mut found = no_stribeck();
@@ -288,20 +275,17 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     }
 
     /// Completion from base values to a physically consistent leg.
-    #[must_use]
     pub fn completion(&self) -> &Completion<T, N> {
         &self.completion
     }
 
     /// All parameters of the consistent leg; `None` until search and completion have ended.
-    #[must_use]
     pub fn parameters(&self) -> Option<LegParameters<T, N>> {
         self.completed.is_some().then(|| self.completion.parameters())
     }
 
     /// Loss of fit of the consistent leg against the plan's least squares, over all rows;
     /// `None` until it is complete.
-    #[must_use]
     pub fn consistency(&self) -> Option<Consistency<T>> {
         self.completed.as_ref().map(|(_, consistency)| *consistency)
     }
@@ -317,7 +301,6 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     }
 
     /// Limit of a row's torque error by noise, N m: six standard deviations plus a twentieth of the torque.
-    #[must_use]
     pub fn unexpected(&self) -> [T; N] {
         let values = self.found();
         core::array::from_fn(|joint| {
@@ -328,7 +311,6 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
     }
 
     /// Standard deviation of one independent row of each joint in the motion identified from, N m.
-    #[must_use]
     pub fn row_noise(&self) -> [T; N] {
         noise(&self.record)
     }

@@ -140,13 +140,11 @@ impl<const N: usize> Control<N> {
     }
 
     /// What was said about the leg.
-    #[must_use]
     pub(crate) fn wearing(&self) -> Option<Wearing> {
         self.assistance.wearing
     }
 
     /// Model of the empty or the worn leg.
-    #[must_use]
     pub fn model_of(&self, wearing: Wearing) -> Option<&IdentifiedModel<N>> {
         match wearing {
             Wearing::Empty => self.assistance.empty.as_ref(),

@@ -41,14 +41,12 @@ impl Mode {
     ];
 
     /// Bit of the mode in 6502; manufacturer-specific modes begin at bit 16.
-    #[must_use]
     pub const fn bit(self) -> u32 {
         let number = self as i8;
         1 << if number > 0 { number - 1 } else { 15 - number }
     }
 
     /// Returns the mode with this number.
-    #[must_use]
     pub(crate) fn from_number(number: i8) -> Option<Self> {
         Self::ALL.into_iter().find(|mode| *mode as i8 == number)
     }
@@ -134,7 +132,6 @@ pub struct ImpedanceTarget {
 
 impl Target {
     /// Mode of the target; `None` for [`Target::Hold`].
-    #[must_use]
     pub const fn mode(&self) -> Option<Mode> {
         Some(match self {
             Self::Hold => return None,
@@ -197,7 +194,6 @@ pub struct JointCommand {
 
 impl JointCommand {
     /// The command with the positions that a host states relative to its zero, relative to the joint's own.
-    #[must_use]
     pub(crate) fn seen_from(mut self, zero: Radian) -> Self {
         match &mut self.target {
             Target::ProfilePosition(SetPoint { position, relative_to: None, .. })

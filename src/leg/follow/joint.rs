@@ -301,7 +301,6 @@ impl Follower {
     }
 
     /// Commanded trajectory.
-    #[must_use]
     pub(crate) fn course(&self) -> Course {
         self.course.plus(&self.gap)
     }

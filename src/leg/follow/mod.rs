@@ -57,7 +57,6 @@ pub struct Following<const N: usize> {
 
 impl<const N: usize> Following<N> {
     /// Creates the followers without a command.
-    #[must_use]
     pub fn new<const B: usize>(configuration: &LegConfiguration<N, B>) -> Self {
         let anatomy = configuration.joints.map(|joint| joint.scale.anatomy);
         Self {
@@ -98,7 +97,6 @@ impl<const N: usize> Following<N> {
     }
 
     /// Whether all joints are commanded to be at rest, without offsets.
-    #[must_use]
     pub(crate) fn is_still(&self) -> bool {
         self.joints.iter().all(Follower::is_still)
     }
@@ -156,7 +154,6 @@ impl<const N: usize> Following<N> {
 
     /// Status of a joint for a host. `torque` is the motor's, with the model's sign. The board adds inputs
     /// and voltage.
-    #[must_use]
     pub fn status(
         &self,
         joint: usize,

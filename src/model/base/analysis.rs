@@ -161,26 +161,22 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
     }
 
     /// Number of base parameters.
-    #[must_use]
     pub fn rank(&self) -> usize {
         self.rank
     }
 
     /// Gap between retained and dropped columns: the margin of the rank.
-    #[must_use]
     pub fn separation(&self) -> Separation<T> {
         self.separation
     }
 
     /// Joint (from 0) and parameter whose column stands for base parameter `b`; `None` from the rank on.
-    #[must_use]
     pub fn independent(&self, b: usize) -> Option<(usize, Parameter)> {
         self.columns().get(b).copied()
     }
 
     /// Factors by which parameters sum up to base parameter `b`: 1 on its independent
     /// column. All zero from the rank on.
-    #[must_use]
     pub fn terms(&self, b: usize) -> &LegParameters<T, N> {
         self.terms.get(b).unwrap_or(&self.nothing)
     }
@@ -195,7 +191,6 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
     }
 
     /// Base values of full parameters; 0 from the rank on.
-    #[must_use]
     pub fn project(&self, parameters: &LegParameters<T, N>) -> [T; B] {
         core::array::from_fn(|b| row_torque(self.terms(b), parameters))
     }
@@ -203,7 +198,6 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
     /// Full parameters with these base values. Starts from `others` and changes the independent
     /// columns' parameters until the projection fits. With zero `others` the independent columns'
     /// parameters are the base values.
-    #[must_use]
     pub(crate) fn complete(&self, values: &[T; B], others: &LegParameters<T, N>) -> LegParameters<T, N> {
         let present = self.project(others);
         let mut parameters = *others;
@@ -217,7 +211,6 @@ impl<T: Real, const N: usize, const B: usize> BaseParameters<T, N, B> {
     }
 
     /// Identifiability of a parameter; [`Standing::Off`] for a joint that does not exist.
-    #[must_use]
     pub fn standing(&self, joint: usize, parameter: Parameter) -> Standing {
         if !self.mask.get(joint).is_some_and(|block| block[parameter.index()]) {
             return Standing::Off;

@@ -32,7 +32,6 @@ use crate::real::Real;
 
 /// Regroups a leg to the fewest parameters that the closed form allows; the
 /// torque of any motion is unchanged.
-#[must_use]
 pub fn regroup<T: Real, const N: usize>(
     chain: &Chain<T, N>,
     parameters: &LegParameters<T, N>,

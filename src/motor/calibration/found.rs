@@ -19,7 +19,6 @@ pub struct EncoderSetting {
 
 impl EncoderSetting {
     /// Encoder setting of an axis.
-    #[must_use]
     pub const fn new(configuration: &AxisConfiguration) -> Self {
         Self {
             counter: configuration.counter,
@@ -104,63 +103,53 @@ pub struct StoredCalibration {
 
 impl Calibration {
     /// Encoder setting of the calibrated configuration.
-    #[must_use]
     pub(crate) fn encoder(&self) -> EncoderSetting {
         self.encoder
     }
 
     /// Whether rotor positions count from the index, or from the absolute encoder's zero.
-    #[must_use]
     pub fn indexed(&self) -> bool {
         self.indexed
     }
 
     /// Whether the offset was measured with the motor turning. Otherwise it is the stored one, and
     /// [`Axis`](crate::motor::Axis) limits the first motion.
-    #[must_use]
     pub fn is_proven(&self) -> bool {
         self.findings.is_some()
     }
 
     /// Flux, friction and uncertainties; `None` where the motor has not turned.
-    #[must_use]
     pub fn findings(&self) -> Option<MotorFindings> {
         self.findings
     }
 
     /// Current-sensor offsets: shunt codes without current.
-    #[must_use]
     pub fn current_offsets(&self) -> [f32; 2] {
         self.current_offsets
     }
 
     /// Resistance of one phase.
-    #[must_use]
     pub fn resistance(&self) -> Ohm {
         self.resistance
     }
 
     /// Inductance along the flux.
-    #[must_use]
     pub fn direct_inductance(&self) -> Henry {
         self.inductances.direct
     }
 
     /// Inductance across the flux.
-    #[must_use]
     pub fn quadrature_inductance(&self) -> Henry {
         self.inductances.quadrature
     }
 
     /// Electrical angle at rotor position zero, which is the index, if there is one.
-    #[must_use]
     pub fn offset(&self) -> ElectricalAngle {
         self.offset
     }
 
     /// Returns the part to store; `None` where positions count from neither an index nor an absolute encoder,
     /// because the counter resets with the power.
-    #[must_use]
     pub fn stored(&self) -> Option<StoredCalibration> {
         self.indexed.then_some(StoredCalibration {
             resistance: self.resistance,
@@ -176,14 +165,12 @@ impl Calibration {
     /// This calibration for a counter that began so many counts further. For tests of its
     /// wrapping, host only.
     #[cfg(not(target_os = "none"))]
-    #[must_use]
     pub fn with_counter_moved(&self, offset: u16) -> Self {
         Self { counter: self.counter.wrapping_add(offset), ..*self }
     }
 
     /// Rotor position at a counter reading, counts from the index or the absolute encoder's zero, in the
     /// electrical direction. Since the calibration the counter may have moved by half of its range.
-    #[must_use]
     pub(crate) fn position_of(&self, scale: &CountScale, direction: Direction, counter: u16) -> i32 {
         let moved = i32::from(counter.wrapping_sub(self.counter).cast_signed());
         scale.within_turn(self.position + direction.sign() * moved)

@@ -330,7 +330,6 @@ impl Calibrator {
     }
 
     /// Forbids a check at standstill: the motor turns, whatever an index search has found.
-    #[must_use]
     pub fn turning(self) -> Self {
         Self { may_stand: false, ..self }
     }
@@ -349,7 +348,6 @@ impl Calibrator {
     /// Sets the rotor position by an absolute encoder, before the first tick: a counter reading, and its
     /// distance from the encoder's zero in the counter's direction. Where stored values may be checked at
     /// standstill, the motor does not turn.
-    #[must_use]
     pub fn at_position(self, counter: u16, counts: i32) -> Self {
         let track = Track::beyond_index(counter, self.bench.direction.sign() * counts);
         Self { track, stands_at: self.may_stand.then_some(0), ..self }
@@ -375,7 +373,6 @@ impl Calibrator {
     }
 
     /// Square of the current vector at the last tick with a bridge on, A^2.
-    #[must_use]
     pub(crate) const fn square_a2(&self) -> f32 {
         self.square_a2
     }

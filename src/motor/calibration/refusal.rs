@@ -142,7 +142,6 @@ impl Refusal {
     ];
 
     /// Number on the bus (2160:5), from 1.
-    #[must_use]
     pub const fn number(self) -> u8 {
         match self {
             Self::Overcurrent => 1,
@@ -176,7 +175,6 @@ impl Refusal {
 
     /// Number beside the reason: a phase from 1, a stored constant (resistance 1, direct inductance 2,
     /// quadrature inductance 3), pole pairs or counts that would fit, or a load in percent; else 0.
-    #[must_use]
     pub(crate) const fn detail(self) -> u32 {
         match self {
             Self::ShuntOffset(phase) | Self::PhaseOpen(phase) | Self::ShuntInverted(phase) => {
@@ -191,7 +189,6 @@ impl Refusal {
     }
 
     /// Both values of a contradiction to the leg file or to the stored calibration.
-    #[must_use]
     pub(crate) const fn mismatch(self) -> Option<Mismatch> {
         match self {
             Self::OtherMotor(_, mismatch) | Self::Flux(mismatch) | Self::StoredOffset(mismatch) => {

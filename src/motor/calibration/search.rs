@@ -55,7 +55,6 @@ impl IndexSearch {
     }
 
     /// Whether the index of this axis is certain.
-    #[must_use]
     pub(crate) fn is_certain(&self, axis: &AxisConfiguration) -> bool {
         let (Ok(scale), Ok(greatest_step)) = (axis.scale(), axis.greatest_step()) else { return false };
         self.position(&scale, greatest_step).is_some()

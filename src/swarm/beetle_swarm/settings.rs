@@ -25,7 +25,6 @@ impl<T: Real> Default for BsoSettings<T> {
 
 impl<T: Real> BsoSettings<T> {
     /// The paper's rules with the paper's constants.
-    #[must_use]
     pub fn paper() -> Self {
         Self::Paper(PaperSettings::default())
     }

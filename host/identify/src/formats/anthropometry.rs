@@ -33,7 +33,6 @@ pub struct Wearer {
 
 impl Wearer {
     /// Person of this mass (kg) and height (m).
-    #[must_use]
     pub(crate) fn from_height(mass: f64, height: f64) -> Self {
         Self {
             mass,
@@ -44,13 +43,11 @@ impl Wearer {
     }
 
     /// The thigh.
-    #[must_use]
     pub(crate) fn thigh(&self) -> Segment {
         limb(0.100 * self.mass, self.thigh, 0.323, 0.08)
     }
 
     /// Shank and foot.
-    #[must_use]
     pub(crate) fn shank(&self) -> [Segment; 2] {
         let mass = 0.0145 * self.mass;
         let gyration = 0.475 * self.foot;
@@ -66,7 +63,6 @@ impl Wearer {
     }
 
     /// Segments of the thigh's link and of the shank's.
-    #[must_use]
     pub fn links(&self) -> [Vec<Segment>; 2] {
         [vec![self.thigh()], self.shank().to_vec()]
     }
@@ -105,7 +101,6 @@ fn limb(mass: f64, length: f64, gyration: f64, radius: f64) -> Segment {
 }
 
 /// Joins segments to a rigid body: mass, centre of mass, and tensor elements XX XY XZ YY YZ ZZ about it.
-#[must_use]
 pub(crate) fn joined(segments: &[Segment]) -> (f64, [f64; 3], [f64; 6]) {
     let mass: f64 = segments.iter().map(|segment| segment.mass).sum();
     let x = segments.iter().map(|segment| segment.mass * segment.x).sum::<f64>() / mass;

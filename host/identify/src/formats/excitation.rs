@@ -92,7 +92,6 @@ pub struct Expected {
 
 /// Fingerprint of the meaning of a motion's angles (FNV-1a, 64 bits). It covers names, Denavit-Hartenberg
 /// numbers and anatomical convention of every joint. Gravity, limits and masses are checked separately.
-#[must_use]
 pub fn geometry(leg: &LegFile) -> String {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     let mut add = |bytes: &[u8]| {
@@ -114,7 +113,6 @@ pub fn geometry(leg: &LegFile) -> String {
 
 impl Excitation {
     /// Motion of a leg, without proof or expectation.
-    #[must_use]
     pub fn from_table<const N: usize>(leg: &LegFile, table: &ExcitationTable<N>) -> Self {
         let joints = leg.joints.iter().enumerate().take(N).map(|(index, joint)| ExcitedJoint {
             name: joint.name.clone(),
@@ -186,7 +184,6 @@ impl Excitation {
     }
 
     /// Duration with blends, s.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         f64::from(self.period_s) * f64::from(self.cycles) + 2.0 * f64::from(self.blend_s)
     }
@@ -224,7 +221,6 @@ impl Excitation {
     }
 
     /// Coefficients for a leg of `N` joints, unchecked.
-    #[must_use]
     pub fn numbers<const N: usize>(&self) -> Option<ExcitationTable<N>> {
         let joints: &[ExcitedJoint; N] = self.joints.as_slice().try_into().ok()?;
         let filled =
@@ -250,7 +246,6 @@ impl Excitation {
     }
 
     /// TOML text that [`Excitation::load`] reads back unchanged.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         let body = toml::to_string(self)
             .unwrap_or_else(|fault| unreachable!("a motion is plain tables and numbers: {fault}"));
@@ -269,7 +264,6 @@ const HEADER: &str = "\
 ";
 
 /// Describes why the numbers do not define a motion.
-#[must_use]
 pub(crate) fn motion_error(error: MotionError) -> String {
     match error {
         MotionError::NotFinite { joint } => format!("joint {}: a coefficient is not finite", joint + 1),

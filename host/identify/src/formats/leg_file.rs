@@ -240,7 +240,6 @@ pub struct EncoderFile {
 
 impl EncoderFile {
     /// Joint angle of one count, rad.
-    #[must_use]
     pub fn step_rad(&self) -> f64 {
         core::f64::consts::TAU / (f64::from(self.counts) * self.ratio)
     }
@@ -359,7 +358,6 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 
 impl JointFile {
     /// Joint with defaults for every other key.
-    #[must_use]
     pub fn new(name: &str, dh: DhFile) -> Self {
         let stated = json!({ "name": name, "dh": DhFile::default() });
         Self { dh, ..with_defaults(stated) }
@@ -368,7 +366,6 @@ impl JointFile {
 
 impl LegFile {
     /// Leg of these joints with defaults for every other key.
-    #[must_use]
     pub(crate) fn plain(name: &str, gravity: [f64; 3], joints: Vec<JointFile>) -> Self {
         let stated = json!({ "name": name, "gravity": [0.0, 0.0, 0.0], "joint": [] });
         Self { gravity, joints, ..with_defaults(stated) }
@@ -427,7 +424,6 @@ impl LegFile {
     }
 
     /// Whether each joint of a checked leg's text states this key. A default must not convert a recording.
-    #[must_use]
     pub(crate) fn joints_that_state(text: &str, key: &str) -> Vec<bool> {
         let table = text.parse::<toml::Table>().unwrap_or_default();
         let joints = table.get("joint").and_then(toml::Value::as_array);
@@ -445,13 +441,11 @@ impl LegFile {
     }
 
     /// Error about this leg.
-    #[must_use]
     pub fn error(&self, reason: impl Into<String>) -> FileError {
         FileError::new(&self.name, reason.into())
     }
 
     /// TOML text that [`LegFile::parse`] reads back unchanged.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string(self)
             .unwrap_or_else(|fault| unreachable!("a leg is plain tables and numbers: {fault}"))

@@ -273,20 +273,17 @@ impl ModelFile {
     }
 
     /// Joint and parameter of a name, for example `ZZ1`.
-    #[must_use]
     pub(crate) fn parameter(&self, name: &str) -> Option<(usize, Parameter)> {
         parameter_of(name, self.leg.joints.len())
     }
 
     /// Whether the name is that of a friction difference between the directions, which acts only
     /// while its joint moves.
-    #[must_use]
     pub(crate) fn is_asymmetry(name: &str) -> bool {
         name.starts_with(ASYMMETRY)
     }
 
     /// Fourteen parameters of a joint; `None` if one is unknown.
-    #[must_use]
     pub fn joint_parameters(&self, joint: usize) -> Option<[f64; scarab::model::PARAMETERS_PER_JOINT]> {
         const COUNT: usize = scarab::model::PARAMETERS_PER_JOINT;
         let own = self.full_set.parameters.get(joint * COUNT..(joint + 1) * COUNT)?;
@@ -297,7 +294,6 @@ impl ModelFile {
 
 impl StoredLeg {
     /// Leg file without truth, prior and drive.
-    #[must_use]
     pub fn to_leg_file(&self) -> LegFile {
         let joints = self.joints.iter().map(|stored| {
             let mut joint = JointFile::new(&stored.name, stored.dh);

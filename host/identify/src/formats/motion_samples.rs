@@ -90,7 +90,6 @@ impl MotionSamples {
     }
 
     /// CSV text.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         let mut text = String::from("t_s");
         (1..=self.joints.len()).for_each(|joint| {
@@ -109,7 +108,6 @@ impl MotionSamples {
     }
 
     /// YAML text of the message.
-    #[must_use]
     pub fn to_trajectory(&self) -> String {
         // JSON is YAML, so any name is quoted correctly.
         let names: Vec<_> =

@@ -53,13 +53,11 @@ pub enum Kind {
 
 impl Kind {
     /// Word of the format.
-    #[must_use]
     pub(crate) fn word(self) -> &'static str {
         KINDS.iter().find(|(_, kind)| *kind == self).map_or("unknown", |(word, _)| word)
     }
 
     /// Whether the joint turns about an axis.
-    #[must_use]
     pub(crate) fn turns(self) -> bool {
         matches!(self, Self::Revolute | Self::Continuous)
     }
@@ -150,14 +148,12 @@ impl Robot {
     }
 
     /// Error about a joint.
-    #[must_use]
     pub(crate) fn joint_error(&self, joint: &Joint, reason: &str) -> FileError {
         let reason = format!("joint `{}`: {reason}", joint.name);
         FileError { file: self.file.clone(), line: Some(joint.line), reason }
     }
 
     /// Error about the whole file.
-    #[must_use]
     pub fn error(&self, reason: impl std::fmt::Display) -> FileError {
         FileError::new(&self.file, reason)
     }

@@ -71,7 +71,6 @@ pub struct Program {
 
 impl Program {
     /// This program, built from sources with this fingerprint.
-    #[must_use]
     pub fn from_sources(sources: &str) -> Self {
         let platform = format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS);
         Self { version: env!("CARGO_PKG_VERSION").into(), sources: sources.into(), platform }
@@ -97,7 +96,6 @@ pub struct CampaignHeader {
 
 impl CampaignHeader {
     /// Command line without shard and output files.
-    #[must_use]
     pub fn command_line(&self) -> Vec<String> {
         let mut words = vec![self.command.clone()];
         for Argument { name, values, .. } in &self.arguments {
@@ -165,13 +163,11 @@ pub struct ShardResults<R> {
 
 impl<R> ShardResults<R> {
     /// Results that this process computed.
-    #[must_use]
     pub fn new(shard: Shard, results: R) -> Self {
         Self { path: PathBuf::new(), shard, results }
     }
 
     /// Error of results that are not those of the shard's runs.
-    #[must_use]
     pub fn damaged(&self, what: &str) -> ToolError {
         let shard = self.shard;
         let why = format!("{what}, which are not the results of shard {shard}");
@@ -279,7 +275,6 @@ impl ShardFiles {
     }
 
     /// What the shards have in common.
-    #[must_use]
     pub fn campaign(&self) -> &CampaignHeader {
         &self.campaign
     }

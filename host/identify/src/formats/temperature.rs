@@ -41,7 +41,6 @@ fn refusal(text: &str) -> String {
 
 /// Warning about a model identified at `model` degrees Celsius on a leg at `leg`; `None` if one is
 /// unknown or the difference is small.
-#[must_use]
 pub fn warning(model: Option<f64>, leg: Option<f64>) -> Option<String> {
     let (model, leg) = (model?, leg?);
     let warmer = leg - model;

@@ -65,7 +65,6 @@ pub(crate) struct DhChain {
 impl DhChain {
     /// Chain of these axes. Axes within `parallel` (rad) of parallel count as parallel. Axes and
     /// gravity are in one frame.
-    #[must_use]
     pub(crate) fn from_axes(axes: &[Axis], gravity: &Vector3<f64>, parallel: f64) -> Self {
         let along = aligned(axes, parallel);
         let normals: Vec<_> = (1..axes.len()).map(|next| normal(&along, axes, next)).collect();

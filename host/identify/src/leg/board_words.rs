@@ -3,7 +3,6 @@
 use scarab::motor::{AxisError, AxisFault, Mismatch, MotorConstant, Phase, Refusal};
 
 /// Reason why the firmware rejects an axis configuration.
-#[must_use]
 pub fn axis_error(error: AxisError) -> String {
     let words = match error {
         AxisError::Sense => "the scales of amplifiers, converter or bus divider are implausible",
@@ -30,7 +29,6 @@ pub fn axis_error(error: AxisError) -> String {
 }
 
 /// Reason for a failed calibration.
-#[must_use]
 pub fn refusal(reason: Refusal) -> String {
     let words = match reason {
         Refusal::Overcurrent => "the current went beyond 61 A".to_owned(),
@@ -110,7 +108,6 @@ const fn name(phase: Phase) -> &'static str {
 }
 
 /// Reason why an axis switched its bridge off.
-#[must_use]
 pub const fn axis_fault(fault: AxisFault) -> &'static str {
     match fault {
         AxisFault::CurrentSense => "a shunt amplifier stayed at its rail",

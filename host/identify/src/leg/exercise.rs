@@ -45,7 +45,6 @@ fn range(joint: &JointFile) -> [f64; 2] {
 
 impl Exercise {
     /// Name in the report.
-    #[must_use]
     pub fn name(self) -> String {
         match self {
             Self::Gait(cadence_hz) => format!("gait {cadence_hz} Hz"),
@@ -56,7 +55,6 @@ impl Exercise {
     }
 
     /// Strides per second of gait.
-    #[must_use]
     pub fn cadence_hz(self) -> Option<f64> {
         match self {
             Self::Gait(cadence_hz) => Some(cadence_hz),
@@ -65,7 +63,6 @@ impl Exercise {
     }
 
     /// Intended motion of hip and knee on a leg; the seed draws the targets of reaching.
-    #[must_use]
     pub fn intended(self, [hip, knee]: [&JointFile; 2], seed: u64) -> IntendedMotion {
         let within = |joint: &JointFile, share: f64| {
             let [low, high] = range(joint);
@@ -111,7 +108,6 @@ impl Exercise {
 }
 
 /// Joints of hip and knee of a leg that has both.
-#[must_use]
 pub fn hip_and_knee(leg: &LegFile) -> Option<[&JointFile; 2]> {
     match leg.joints.as_slice() {
         [hip, knee] => Some([hip, knee]),

@@ -27,7 +27,6 @@ pub fn refuse_another_leg(model: &ModelFile, file: &str, leg: &LegFile) -> Resul
 }
 
 /// Differences between a model's leg and a leg; empty if they match.
-#[must_use]
 pub(crate) fn differences(model: &ModelFile, leg: &LegFile) -> Vec<String> {
     let stored = &model.leg;
     let mut found = Vec::new();

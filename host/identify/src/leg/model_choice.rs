@@ -15,7 +15,6 @@ pub struct TermSwitches {
 
 impl TermSwitches {
     /// Reads the request of a joint.
-    #[must_use]
     pub(crate) fn from_joint(joint: &JointFile) -> Self {
         Self {
             rotor: joint.rotor,
@@ -35,7 +34,6 @@ fn choice(switch: Switch) -> Choice {
 }
 
 /// Choice for a joint's rotor and constant column.
-#[must_use]
 pub(crate) fn drive_choice(joint: &JointFile) -> DriveChoice {
     let (constant, meaning) = match (joint.offset, joint.asymmetric_coulomb) {
         (Switch::Off | Switch::Auto, Switch::On) => (Choice::On, Constant::Asymmetry),
@@ -46,7 +44,6 @@ pub(crate) fn drive_choice(joint: &JointFile) -> DriveChoice {
 }
 
 /// Choice for a joint's Stribeck friction.
-#[must_use]
 pub(crate) fn stribeck_choice(joint: &JointFile) -> Choice {
     choice(joint.stribeck_model)
 }

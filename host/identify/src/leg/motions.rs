@@ -73,7 +73,6 @@ pub fn motions<const N: usize, const B: usize>(
 }
 
 /// Default exciting motion: the most informative of 300 random ones.
-#[must_use]
 pub fn random_excitation<const N: usize, const B: usize>(
     model: &RowModel<f64, N, B>,
     limits: &[JointEnvelope; N],
@@ -84,7 +83,6 @@ pub fn random_excitation<const N: usize, const B: usize>(
 }
 
 /// Most informative of `candidates` random motions with seeds from `seed` on.
-#[must_use]
 pub fn most_informative<const N: usize, const B: usize>(
     model: &RowModel<f64, N, B>,
     limits: &[JointEnvelope; N],

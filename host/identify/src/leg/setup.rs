@@ -79,13 +79,11 @@ macro_rules! with_leg_size {
 }
 
 /// Number of base parameters of a leg of two joints; zero for another number, or if they cannot be found.
-#[must_use]
 pub fn base_rank(leg: &LegFile) -> usize {
     row_model::<2, 18>(leg).map_or(0, |model| model.base.rank())
 }
 
 /// Columns to be estimated according to a leg file.
-#[must_use]
 pub(crate) fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
     core::array::from_fn(|joint| {
         let mut columns = [true; PARAMETERS_PER_JOINT];
@@ -98,7 +96,6 @@ pub(crate) fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
 }
 
 /// Joint angles of one count of the encoders, rad, by the arithmetic of the board's description.
-#[must_use]
 pub(crate) fn encoder_steps<T: Real, const N: usize>(leg: &LegFile) -> [T; N] {
     core::array::from_fn(|joint| {
         leg.joints.get(joint).map_or(T::zero(), |joint| {
@@ -175,7 +172,6 @@ const PRIOR_STREAM: u64 = 0x0070_7269_6f72;
 
 /// Prior with an error of `percent` in every number, signs from the seed; physically consistent,
 /// offset zero.
-#[must_use]
 pub(crate) fn wrong_prior<const N: usize>(
     truth: &[LinkPrior<f64>; N],
     percent: f64,
@@ -258,7 +254,6 @@ fn stribeck_truth(joint: &JointFile) -> Option<StribeckTruth> {
 }
 
 /// Largest inertia moved by each joint, kg m2, over postures of the whole circle.
-#[must_use]
 pub fn largest_inertia<const N: usize>(
     chain: &Chain<f64, N>,
     parameters: &LegParameters<f64, N>,

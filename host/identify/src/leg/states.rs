@@ -92,7 +92,6 @@ impl<const N: usize> States<N> {
     }
 
     /// Error of a row whose torque exceeds the range of the number format.
-    #[must_use]
     pub(crate) fn out_of_range(&self, row: usize) -> FileError {
         refuse(&self.file, self.lines.line_of(row), Fault::OutOfRange)
     }

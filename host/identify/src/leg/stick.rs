@@ -31,7 +31,6 @@ fn placed(joint: &DhFile, angle: f64) -> (Matrix3<f64>, Vector3<f64>) {
 
 impl Stick {
     /// Figure of a leg.
-    #[must_use]
     pub fn from_leg(leg: &LegFile) -> Self {
         let joints: Vec<DhFile> = leg.joints.iter().map(|joint| joint.dh).collect();
         let last = leg.joints.last();

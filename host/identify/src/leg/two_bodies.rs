@@ -62,7 +62,6 @@ fn insisting(damping: f64) -> MuscleDescription {
 
 impl MuscleTone {
     /// Muscles of hip and knee.
-    #[must_use]
     pub(crate) fn muscles(self) -> [MuscleDescription; 2] {
         match self {
             Self::Relaxed => [MuscleDescription::HIP, MuscleDescription::KNEE],
@@ -123,7 +122,6 @@ impl TwoBodies {
     }
 
     /// The wearer for the simulated hardware.
-    #[must_use]
     pub fn wearer(&self, tone: MuscleTone) -> WearerDescription {
         description(&self.person, tone)
     }
@@ -136,7 +134,6 @@ fn machine(link: &LinkParameters, part: &[Segment]) -> Option<LinkParameters> {
 }
 
 /// A person for the simulated hardware: aligned joint axes, padded cuffs.
-#[must_use]
 pub fn description(person: &Wearer, tone: MuscleTone) -> WearerDescription {
     let segments = person.links().map(|part| {
         let (mass, [along, forward, _], inertia) = joined(&part);

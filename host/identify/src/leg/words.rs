@@ -52,7 +52,6 @@ fn limit_words(joint: &JointFile, quantity: LimitQuantity) -> String {
 }
 
 /// Reason why the firmware rejects a leg.
-#[must_use]
 pub fn leg_error(leg: &LegFile, error: LegError) -> String {
     match error {
         LegError::Servo(ServoError::Scale { joint }) => format!(
@@ -90,7 +89,6 @@ pub fn leg_error(leg: &LegFile, error: LegError) -> String {
 }
 
 /// Reason why a drive is no longer enabled.
-#[must_use]
 pub fn drive_stop(leg: &LegFile, state: DriveState) -> String {
     let Some(fault) = state.fault() else {
         return "the drive was switched off during identification".into();

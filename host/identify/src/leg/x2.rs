@@ -76,14 +76,12 @@ fn shank(wearer: &Wearer, drive: Drive) -> LinkParameters {
 /// Hip and knee worn by a person of `body_mass` kg. The prior is a designer's: the same exoskeleton on a
 /// standard wearer of 70 kg, round figures for rotor inertia and friction. Torque is limited to 85 N m. The
 /// 100 N m of the exoskeleton would be 66.7 A, and the board measures up to 60.75 A at its finer gain.
-#[must_use]
 pub fn leg_file(body_mass: f64) -> LegFile {
     let wearer = Wearer { mass: body_mass, thigh: THIGH_M, shank: SHANK_M, foot: WEARER_FOOT_M };
     leg_file_of(&wearer, STANDARD_WEARER_KG)
 }
 
 /// Default leg with a wearer's lengths, and a prior that assumes another body mass.
-#[must_use]
 pub(crate) fn leg_file_of(wearer: &Wearer, prior_mass: f64) -> LegFile {
     let standard = Wearer { mass: prior_mass, ..*wearer };
     let drive = |joint: &mut JointFile| {

@@ -26,7 +26,6 @@ pub struct OutliersReport {
 
 impl OutliersReport {
     /// One line; `None` for plain least squares.
-    #[must_use]
     pub fn line(&self) -> Option<String> {
         if self.estimator == "plain" {
             return Some("estimator: plain least squares, nothing excluded".into());
@@ -69,7 +68,6 @@ pub struct StribeckReport {
 
 impl StribeckReport {
     /// One line of text.
-    #[must_use]
     pub fn line(&self) -> String {
         format!(
             "Stribeck friction of joint {}: {} +- {} N m above Coulomb's at rest, fallen to 1/e at {} +- {} rad/s (explains {} \

@@ -75,7 +75,6 @@ pub(crate) struct RecordingsReport {
 
 impl RecordingsReport {
     /// Line of the report: whether sigma contains the scatter.
-    #[must_use]
     pub fn line(&self) -> String {
         match (self.count, self.sigma.is_empty()) {
             (0, _) => "sigma does not contain the scatter between recordings: too few rows".into(),
@@ -182,7 +181,6 @@ pub struct SampleFinding {
 
 impl DirectionReport {
     /// Estimate in words: "torque of joint 1: 9.8 +- 0.4 ms late".
-    #[must_use]
     pub fn words(&self) -> String {
         let joint = self.joint.unwrap_or(0);
         let (Some(value), Some(sigma)) = (self.value.known(), self.sigma.known()) else {
@@ -213,7 +211,6 @@ impl DirectionReport {
     }
 
     /// Line of the report.
-    #[must_use]
     pub fn line(&self) -> String {
         let alike = match self.alike.as_slice() {
             [] => String::new(),
@@ -223,7 +220,6 @@ impl DirectionReport {
     }
 
     /// Test of the verdict.
-    #[must_use]
     pub(crate) fn finding(&self) -> FindingReport {
         let failure = (!self.passed).then(|| {
             format!(
@@ -246,14 +242,12 @@ fn digits(sigma: f64) -> usize {
 
 impl CauseReport {
     /// Printed line.
-    #[must_use]
     pub fn line(&self) -> String {
         let name = format!("{}: ", self.name.replace('_', " "));
         format!("likely cause: {name}{}", self.words.strip_prefix(&name).unwrap_or(&self.words))
     }
 
     /// Whether the line contains what a finding says, so that it suffices.
-    #[must_use]
     pub fn says(&self, finding: &FindingReport) -> bool {
         !finding.words.is_empty() && self.words.starts_with(&finding.words)
     }
@@ -261,7 +255,6 @@ impl CauseReport {
 
 impl DoubtReport {
     /// Lines below the tables.
-    #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let mut lines: Vec<String> = self.bandwidth.iter().map(BandwidthReport::line).collect();
         let ratios: Vec<String> = self

@@ -31,7 +31,6 @@ pub struct FindingReport {
 
 impl FindingReport {
     /// Report of one piece of evidence; `motions` are the names of the unused motions.
-    #[must_use]
     pub fn new(evidence: &Evidence<f32>, motions: &[&str]) -> Self {
         let motion = evidence.motion.map(|index| {
             motions.get(index).map_or_else(|| format!("motion {}", index + 1), |name| (*name).to_owned())
@@ -52,7 +51,6 @@ impl FindingReport {
 
     /// Report of a test with a value and a limit; `failure` is the sentence of a failed one. Joints count
     /// from 1.
-    #[must_use]
     pub fn judged(
         reason: Word,
         test: Word,
@@ -65,7 +63,6 @@ impl FindingReport {
     }
 
     /// Report of a drive that stopped before the end of the identification; `words` give the reason.
-    #[must_use]
     pub fn stopped(words: String) -> Self {
         let values = [0.0, 1.0].map(Number::from);
         Self::judged(Reason::Input.name(), Test::Drive.name(), None, values, Some(words))
@@ -76,7 +73,6 @@ impl FindingReport {
 const LARGEST_UNTESTED_LENGTH: f64 = 0.1;
 
 /// Sentences about lengths that the recording hardly tests: the limit of their test is wide.
-#[must_use]
 pub fn untested_lengths(findings: &[FindingReport]) -> Vec<String> {
     let wide = |finding: &&FindingReport| {
         finding.test == Test::LinkLength.name()

@@ -200,7 +200,6 @@ pub struct AddedMassReport {
 
 impl AddedMassReport {
     /// Whether the mass explains the difference.
-    #[must_use]
     pub fn explains(&self) -> bool {
         self.chi2 <= self.chi2_limit
     }
@@ -375,19 +374,16 @@ impl<'de> Deserialize<'de> for RunReport {
 
 impl RunReport {
     /// Whether the run is a replay of recordings.
-    #[must_use]
     pub fn is_replay(&self) -> bool {
         self.doubt.is_some()
     }
 
     /// Whether a prior bounds the search and completes what torque does not determine.
-    #[must_use]
     pub fn has_prior(&self) -> bool {
         self.prior != "none"
     }
 
     /// Whether the result was accepted: exit code 0.
-    #[must_use]
     pub fn accepted(&self) -> bool {
         self.reasons.is_empty()
     }

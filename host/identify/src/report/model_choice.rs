@@ -44,7 +44,6 @@ pub struct DirectionsReport {
 }
 
 /// One line for each decision that was left to the data.
-#[must_use]
 pub fn lines(choices: &[ModelChoiceReport], directions: &[DirectionsReport]) -> Vec<String> {
     let open = choices.iter().filter(|choice| choice.asked == "auto");
     let open = open.map(|choice| {

@@ -52,7 +52,6 @@ pub struct SkippedReport {
 
 impl ReadReport {
     /// Whether something is not as documented for a recording in SI units, and must be printed.
-    #[must_use]
     pub fn is_notable(&self) -> bool {
         let is_plain = |column: &ColumnReport| column.factor == 1.0 && column.by.is_none();
         self.skipped > 0

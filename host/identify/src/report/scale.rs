@@ -65,7 +65,6 @@ impl Default for ScaleReport {
 }
 
 /// Scale and load of a run in words, a line each; a replay has constants only with a known mass.
-#[must_use]
 pub fn lines(run: &RunReport) -> Vec<String> {
     let scale = &run.scale;
     let mut lines = if scale.torque_constant.is_empty() { Vec::new() } else { constant_lines(scale) };
@@ -123,7 +122,6 @@ fn constant(joint: &TorqueConstantReport) -> String {
 }
 
 /// Constants of many runs, a line per joint; empty without a known mass.
-#[must_use]
 pub fn summary(runs: &[RunReport]) -> Vec<String> {
     let joints = runs.first().map_or(0, |run| run.scale.torque_constant.len());
     (0..joints)

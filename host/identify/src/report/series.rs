@@ -39,7 +39,6 @@ pub enum Role {
 
 impl Role {
     /// Name in reports.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Training => "identified from",
@@ -157,7 +156,6 @@ impl<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize
     }
 
     /// The curves of a run.
-    #[must_use]
     pub fn series(self, solver: &Solver<f32, N, B>, motions: Vec<MotionSeries>) -> Series {
         let record = solver.record();
         let overlap = f64::from(record.row_information).sqrt();
@@ -166,7 +164,6 @@ impl<'a, const N: usize, const B: usize, const TAPS: usize, const PENDING: usize
     }
 
     /// Curves of a run without a solver.
-    #[must_use]
     pub fn of_motions(self, motions: Vec<MotionSeries>) -> Series {
         Series { motions, white_correlation: self.white_correlation, ..Series::default() }
     }
@@ -184,7 +181,6 @@ fn white_correlation(weights: &[f32]) -> Vec<f64> {
 
 /// Autocorrelation of a joint's residuals over its motions, by lag in rows; pairs with a joint at
 /// rest are excluded.
-#[must_use]
 pub fn autocorrelation(residuals: &[Vec<Option<f64>>], lags: usize) -> Vec<f64> {
     let mean_product = |lag: usize| -> f64 {
         let pairs = residuals.iter().flat_map(|motion| motion.iter().zip(motion.iter().skip(lag)));

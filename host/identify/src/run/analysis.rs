@@ -114,7 +114,6 @@ pub struct Outcome<const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> Background<N, B> {
     /// Name of a base parameter: its carrier, with an `R` if others are regrouped into it.
-    #[must_use]
     pub fn base_name(&self, base: usize) -> String {
         let Some((joint, parameter)) = self.model.base.independent(base) else { return String::new() };
         let others = self.terms(base).count() > 1;
@@ -154,7 +153,6 @@ impl<const N: usize, const B: usize> Background<N, B> {
     }
 
     /// Constrained optimum of the swarm and both costs, in double precision and chi-square units.
-    #[must_use]
     pub fn costs(&self, solver: &Solver<f32, N, B>) -> Costs<B> {
         let record = solver.record().convert::<f64>();
         let all = Problem::new(&record, &self.model).weighted();
@@ -190,7 +188,6 @@ impl<const N: usize, const B: usize> Background<N, B> {
     }
 
     /// Report of a run from its solver.
-    #[must_use]
     pub fn report(
         &self,
         solver: &Solver<f32, N, B>,
@@ -242,7 +239,6 @@ impl<const N: usize, const B: usize> Background<N, B> {
     }
 
     /// Report of an outcome: all of its values with their names.
-    #[must_use]
     pub fn run_report(&self, outcome: Outcome<N, B>, circumstances: &Circumstances<B>) -> RunReport {
         let (estimate, dropped) = (&outcome.estimate, &outcome.selection.dropped);
         let base = self.base_parameters(dropped, estimate, circumstances.cramer_rao.as_ref());
@@ -374,7 +370,6 @@ impl<const N: usize, const B: usize> Background<N, B> {
     }
 
     /// Other parameters of the same base parameters.
-    #[must_use]
     pub fn grouped_with(&self, joint: usize, parameter: Parameter) -> Vec<String> {
         let carriers = self.model.base.carriers(joint, parameter);
         let others = carriers

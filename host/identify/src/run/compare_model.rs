@@ -82,7 +82,6 @@ impl<'a> Common<'a> {
 }
 
 /// Compares a base set, found at this temperature, with a stored model; `None` without common parameters.
-#[must_use]
 pub fn compare(
     model: &ModelFile,
     file: &str,

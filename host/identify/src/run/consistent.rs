@@ -25,7 +25,6 @@ const ARRIVED: f64 = 0.5;
 const SHARE_OF_COST: f64 = 1e-3;
 
 /// Least cost of an allowed leg above that of least squares, chi-square units.
-#[must_use]
 pub fn optimum<const N: usize, const B: usize>(
     background: &Background<N, B>,
     solver: &Solver<f32, N, B>,
@@ -42,7 +41,6 @@ pub fn optimum<const N: usize, const B: usize>(
 }
 
 /// Compares both searches with the optimum.
-#[must_use]
 pub fn compare<const N: usize, const B: usize>(
     background: &Background<N, B>,
     solver: &Solver<f32, N, B>,

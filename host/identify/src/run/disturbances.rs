@@ -7,7 +7,6 @@ use crate::report::disturbances::{OutliersReport, StribeckReport};
 
 impl OutliersReport {
     /// Report of a training motion's record.
-    #[must_use]
     pub(crate) fn from_record<const N: usize, const B: usize>(
         record: &Record<f32, N, B>,
         estimator: &'static str,
@@ -26,7 +25,6 @@ impl OutliersReport {
 
 impl StribeckReport {
     /// Report of an identified Stribeck curve with these base parameters.
-    #[must_use]
     pub fn new<const B: usize>(joint: usize, fit: &StribeckFit<f32, B>, values: &[f32; B]) -> Self {
         Self {
             joint: joint + 1,

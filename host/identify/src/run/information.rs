@@ -25,7 +25,6 @@ pub struct Information<const N: usize> {
 impl<const N: usize> Information<N> {
     /// Information of `rank` base parameters and the joints' curves; curves beyond the capacity are
     /// omitted.
-    #[must_use]
     pub fn new(rank: usize, curves: [Option<StribeckTruth>; N]) -> Self {
         let columns = rank + 2 * curves.iter().flatten().count();
         let (curves, columns) = if columns <= LARGEST_COLUMNS {
@@ -58,7 +57,6 @@ impl<const N: usize> Information<N> {
     }
 
     /// Information with these base parameters known to be zero.
-    #[must_use]
     pub fn without(&self, dropped: &[bool]) -> Self {
         let mut factor = [0.0; LARGEST_SIZE];
         for (column, kept) in packed::rows(&self.factor, self.columns) {
@@ -72,7 +70,6 @@ impl<const N: usize> Information<N> {
     }
 
     /// Bounds of the base parameters and of each joint's surplus.
-    #[must_use]
     pub fn bounds<const B: usize>(&self) -> ([f64; B], [Option<f64>; N]) {
         let mut variance = [0.0; LARGEST_COLUMNS];
         for unit in 0..self.columns {

@@ -42,7 +42,6 @@ fn decided(used: bool, why: &str) -> Decision {
 impl<const N: usize, const B: usize> Background<N, B> {
     /// Name of a parameter in this leg's reports: `FCA1` if the constant column is a difference of
     /// the directions.
-    #[must_use]
     pub fn name(&self, joint: usize, parameter: Parameter) -> String {
         if parameter == Parameter::OFF && self.meaning(joint) == Constant::Asymmetry {
             return asymmetry_name(joint);
@@ -56,7 +55,6 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
     /// All terms of all joints. `stribeck` states for each joint whether its Stribeck friction is used, and
     /// the root mean square of its torque. An unreported gain is NaN.
-    #[must_use]
     pub fn model_choice(
         &self,
         found: &Selection<f32, N, B>,
@@ -186,7 +184,6 @@ impl<const N: usize, const B: usize> Background<N, B> {
     }
 
     /// Coulomb friction of both directions, for joints in which they differ according to the data.
-    #[must_use]
     pub(crate) fn directions(
         &self,
         dropped: &[bool; B],

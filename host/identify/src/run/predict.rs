@@ -46,7 +46,6 @@ pub struct Prediction {
 
 impl Prediction {
     /// Sum of the parts, N m.
-    #[must_use]
     pub fn total(&self) -> f64 {
         self.rigid + self.friction + self.offset
     }
@@ -75,7 +74,6 @@ impl<'a, const N: usize> Predictor<'a, N> {
     }
 
     /// Torques of a state in D-H angles.
-    #[must_use]
     pub fn torques(&self, state: &JointState<f64, N>) -> [Prediction; N] {
         let set = &self.model.base_set;
         let mut torques = regressor(&self.chain, state, &self.gravity).map(|row| {

@@ -85,7 +85,6 @@ pub struct ReplayOptions {
 
 impl ReplayOptions {
     /// Defaults for a leg: its bandwidth and prior, one-time, robust, nothing held out.
-    #[must_use]
     pub fn from_leg(leg: &LegFile) -> Self {
         Self {
             split: None,

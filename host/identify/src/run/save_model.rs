@@ -18,7 +18,6 @@ use crate::report::{FitReport, ModelDetail, RunReport};
 impl<const N: usize, const B: usize> Background<N, B> {
     /// Further data for a model file. The covariance is symmetric up to rounding and is made
     /// exactly symmetric.
-    #[must_use]
     pub(crate) fn detail(&self, dropped: &[bool; B], estimate: &Estimate<f32, B>) -> ModelDetail {
         let base = &self.model.base;
         let kept: Vec<usize> = self.kept(dropped).collect();
@@ -44,7 +43,6 @@ impl<const N: usize, const B: usize> Background<N, B> {
 
 impl BaseSet {
     /// Base parameters of a run that have a value and a sigma, without Stribeck friction.
-    #[must_use]
     pub fn from_run(run: &RunReport) -> Self {
         let detail = &run.detail;
         let stored = run.base_parameters.iter().zip(&detail.carriers).enumerate();
@@ -69,7 +67,6 @@ impl BaseSet {
 impl ModelFile {
     /// Model of an accepted run with its bandwidth (Hz), dated now. `None` if the run was rejected:
     /// a wrong model is not stored.
-    #[must_use]
     pub fn from_run(leg: &LegFile, run: &RunReport, bandwidth_hz: f64) -> Option<Self> {
         let leg = &with_identified_constants(leg, run);
         let base_set = BaseSet::from_run(run);

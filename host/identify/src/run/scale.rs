@@ -27,7 +27,6 @@ pub struct Scale<const N: usize, const B: usize> {
 impl<const N: usize, const B: usize> Scale<N, B> {
     /// Ratios of assumed over true constants; `None` unless the mass determined all of them accurately and
     /// without contradiction.
-    #[must_use]
     pub fn trusted(&self) -> Option<[ConstantRatio<f32>; N]> {
         let all: Option<Vec<_>> = self
             .ratios
@@ -39,7 +38,6 @@ impl<const N: usize, const B: usize> Scale<N, B> {
 }
 
 /// Base parameters of a mass.
-#[must_use]
 pub fn base_of<const N: usize, const B: usize>(
     background: &Background<N, B>,
     mass: &Payload<f64>,
@@ -48,7 +46,6 @@ pub fn base_of<const N: usize, const B: usize>(
 }
 
 /// Base values of the leg with its load, from those of the leg alone.
-#[must_use]
 pub fn loaded<const N: usize, const B: usize>(scale: Option<&Scale<N, B>>, values: &[f32; B]) -> [f32; B] {
     let load = scale.map_or([0.0; B], |scale| scale.load_base);
     core::array::from_fn(|base| values[base] + load[base])
@@ -56,7 +53,6 @@ pub fn loaded<const N: usize, const B: usize>(scale: Option<&Scale<N, B>>, value
 
 impl ScaleReport {
     /// Results with the torque constants `used`, N m/A.
-    #[must_use]
     pub fn new<const N: usize, const B: usize>(scale: &Scale<N, B>, used: &[f64; N]) -> Self {
         let of = |joint: usize, ratio: &Option<ConstantRatio<f32>>| {
             let used = used[joint];

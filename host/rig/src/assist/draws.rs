@@ -34,7 +34,6 @@ const KNEE_OFFSET_M: f64 = 0.010;
 const HIP_OFFSET_M: f64 = 0.015;
 
 /// Wearer of this seed for an exoskeleton that is adjusted to these lengths.
-#[must_use]
 pub fn wearer(lengths: &Wearer, seed: u64) -> WearerDescription {
     let mut random = Random::new("wearer", seed);
     let [lightest, heaviest] = BODY_MASS_KG;
@@ -72,7 +71,6 @@ fn scale(muscle: &mut MuscleDescription, factor: f64) {
 }
 
 /// Exoskeleton of this seed: the truth of a leg file with other masses, rotors and friction. The prior stays.
-#[must_use]
 pub fn exoskeleton(leg: &LegFile, seed: u64) -> LegFile {
     let mut random = Random::new("exo", seed);
     let mut drawn = leg.clone();

@@ -258,13 +258,11 @@ impl CompensationLoop {
     }
 
     /// Factor by which the slowest decaying or fastest growing vibration changes in a sample.
-    #[must_use]
     pub(crate) fn growth(&self, compensated: Compensated) -> f64 {
         spectral_radius(self.map(compensated))
     }
 
     /// Largest share of inertia below which every share is stable, at most 1, within `WIDTH`.
-    #[must_use]
     pub(crate) fn largest_inertia(&self, friction: f64) -> f64 {
         let is_stable = |inertia: f64| self.growth(Compensated { inertia, friction }) < 1.0;
         if !is_stable(0.0) {
@@ -361,7 +359,6 @@ fn rigid_body(leg: &LegDescription<2>, at: [f64; 2]) -> [Matrix2<f64>; 2] {
 }
 
 /// The wearer's limb in place of the exoskeleton's links, without rotors and friction.
-#[must_use]
 pub(crate) fn limb_alone(leg: &LegDescription<2>, wearer: &WearerDescription) -> LegDescription<2> {
     let mut limb = *leg;
     limb.joints[1].frame.a = wearer.thigh_length;

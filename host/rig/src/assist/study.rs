@@ -36,7 +36,6 @@ pub enum Mode {
 
 impl Mode {
     /// Name in the report.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Transparent => "transparent",
@@ -46,7 +45,6 @@ impl Mode {
     }
 
     /// Shares of this mode, of those that the operator chose.
-    #[must_use]
     pub fn shares(self, chosen: &AssistFile) -> AssistFile {
         match self {
             Self::Transparent => AssistFile { weight: 0.0, periodic: 0.0, ..*chosen },

@@ -61,7 +61,6 @@ pub struct Cuffs {
 
 impl Cuffs {
     /// A wearer with these cuffs; stiffness and damping along the segment keep their ratio.
-    #[must_use]
     pub fn on(&self, wearer: &WearerDescription) -> WearerDescription {
         let cuffs = wearer.cuffs.map(|mut cuff| {
             let stiffer = self.stiffness / cuff.across.stiffness;

@@ -136,13 +136,11 @@ impl<'a, const B: usize> Stage<'a, B> {
     ///
     /// # Panics
     /// Never: a stage has a wearer.
-    #[must_use]
     pub fn wearer(&self) -> WearerTruth {
         self.pair.world.wearer_truth().expect("a stage has a wearer")
     }
 
     /// Whether a session was begun and no longer runs.
-    #[must_use]
     pub(crate) fn has_ended(&self) -> bool {
         self.is_assisted && !self.pair.leg.control().activity().assists()
     }

@@ -202,7 +202,6 @@ impl<const N: usize> Levels<N> {
 
     /// Shares of the torque that the limits of the supply current leave: of one that drives a joint, and of
     /// one that a joint drives.
-    #[must_use]
     pub(crate) fn supply_shares(&self) -> [f32; 2] {
         self.servo.supply_shares()
     }
@@ -232,7 +231,6 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Whether a round of the housekeeping is due in this period.
-    #[must_use]
     pub(crate) fn is_round_due(period: u64) -> bool {
         period.is_multiple_of(PERIODS_PER_ROUND)
     }
@@ -267,13 +265,11 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Seed of the search of this identification.
-    #[must_use]
     pub(crate) fn seed(&self) -> u64 {
         self.identification.seed()
     }
 
     /// Whether the leg of this identification is empty or worn, if known.
-    #[must_use]
     pub(crate) fn wearing(&self) -> Option<Wearing> {
         self.identification.wearing()
     }
@@ -296,7 +292,6 @@ impl<const N: usize> Levels<N> {
     }
 
     /// Newest joint samples waiting for the servo.
-    #[must_use]
     pub(crate) fn samples(&self) -> Option<[JointSample; N]> {
         let queues = self.queues.lock();
         let mut samples = [JointSample::default(); N];
@@ -312,7 +307,6 @@ impl<const N: usize> Levels<N> {
     }
 
     /// First axis that switched itself off, and its fault.
-    #[must_use]
     pub fn fault(&self) -> Option<(usize, AxisFault)> {
         (0..N).find_map(|axis| Some((axis, self.loops.axis_state(axis)?.fault()?)))
     }

@@ -91,7 +91,6 @@ pub struct Registers<const N: usize> {
 
 impl<const N: usize> Registers<N> {
     /// State after power-up: bridges off, contacts open.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             contacts: Contacts::default(),

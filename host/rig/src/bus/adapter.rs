@@ -88,7 +88,6 @@ pub(crate) struct Adapter {
 
 impl Adapter {
     /// Creates an adapter, plugged in and without a client.
-    #[must_use]
     pub fn new(bits_per_s: u64, speed: f64) -> Self {
         let most_bits = (bits_per_s as f64 * speed * MOST_AGE.as_secs_f64()) as u64;
         Self {

@@ -290,13 +290,11 @@ impl<const N: usize, const B: usize> Board<N, B> {
     }
 
     /// Whether a frame is an emergency message of this board.
-    #[must_use]
     pub(crate) fn is_emergency(&self, frame: &Frame) -> bool {
         frame.full().is_some() && self.device.reports_once(frame)
     }
 
     /// Returns the nodes.
-    #[must_use]
     pub fn nodes(&self) -> &[Node; N] {
         self.device.nodes()
     }

@@ -74,7 +74,6 @@ impl Speaks {
 
 /// Writes to a joint's object dictionary that set the compact mapping (docs/bus.md): index, subindex, value,
 /// size.
-#[must_use]
 pub fn compact_mapping(joint: usize) -> Vec<(u16, u8, u32, u8)> {
     let node = NODES[joint];
     let mut targets = [0x0007_0020; JOINTS];
@@ -126,7 +125,6 @@ fn refused(words: String) -> ToolError {
 
 impl Host {
     /// Connects to one board; nothing is sent yet.
-    #[must_use]
     pub fn new(board: Board<JOINTS, BASE>) -> Self {
         Self {
             network: Network::new(vec![board], 1_000_000),
@@ -229,13 +227,11 @@ impl Host {
     }
 
     /// End of the last heartbeat on the wire, and of the SYNC that made the last targets valid.
-    #[must_use]
     pub(crate) fn sent_ns(&self) -> [u64; 2] {
         self.sent_ns
     }
 
     /// End of the last cyclic frame to each node on the wire that took effect: SYNC or controlword.
-    #[must_use]
     pub(crate) fn cyclic_ns(&self) -> [u64; JOINTS] {
         self.cyclic_ns
     }
@@ -251,7 +247,6 @@ impl Host {
     }
 
     /// Emergency messages so far: node and code.
-    #[must_use]
     pub(crate) fn emergencies(&self) -> &[(u16, u16)] {
         &self.emergencies
     }

@@ -22,7 +22,6 @@ pub struct Network<const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> Network<N, B> {
     /// Connects the boards by a bus of this bit rate.
-    #[must_use]
     pub fn new(boards: Vec<Board<N, B>>, bits_per_s: u64) -> Self {
         Self {
             boards,
@@ -57,7 +56,6 @@ impl<const N: usize, const B: usize> Network<N, B> {
     }
 
     /// Effect that a frame of the host would have on its nodes now.
-    #[must_use]
     pub(crate) fn effect(&self, frame: &Frame) -> Effect {
         Effect::from_frame(frame, self.boards.iter().flat_map(|board| board.nodes()), self.now_ns / 1000)
     }
@@ -69,7 +67,6 @@ impl<const N: usize, const B: usize> Network<N, B> {
     }
 
     /// Number of the host's frames not sent yet.
-    #[must_use]
     pub fn waiting(&self) -> usize {
         self.host.len()
     }
@@ -107,7 +104,6 @@ impl<const N: usize, const B: usize> Network<N, B> {
     }
 
     /// Simulated time.
-    #[must_use]
     pub fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -118,7 +114,6 @@ impl<const N: usize, const B: usize> Network<N, B> {
     }
 
     /// Returns the bus.
-    #[must_use]
     pub fn wire(&self) -> &Wire {
         &self.wire
     }

@@ -46,7 +46,6 @@ pub struct Pace {
 
 impl Pace {
     /// Starts now.
-    #[must_use]
     pub fn new(speed: f64, now: Instant, now_ns: u64) -> Self {
         let start = (now, now_ns);
         Self { speed, start, second: start, late: Duration::ZERO, let_go: Duration::ZERO }
@@ -86,7 +85,6 @@ impl Pace {
 
 impl Second {
     /// Returns the report, if the pace was not held.
-    #[must_use]
     pub fn report(&self, speed: f64) -> Option<String> {
         let differs = (self.speed / speed - 1.0).abs() > SPEED_DIFFERS;
         if !differs && self.late < LATE && self.let_go.is_zero() {
@@ -135,7 +133,6 @@ fn spent(begin: Instant) -> Duration {
 
 /// Speeds that this machine reaches with enabled drives if nothing else runs, in simulated seconds per second
 /// of the processor, in ascending order.
-#[must_use]
 pub(crate) fn reachable<const N: usize, const B: usize>(network: &Network<N, B>) -> Vec<f64> {
     let mut network = enabled(network);
     let start = Instant::now();

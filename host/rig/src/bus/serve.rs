@@ -67,7 +67,6 @@ pub struct ServeOptions {
 
 impl ServeOptions {
     /// Legs in real time at a free port of this machine.
-    #[must_use]
     pub fn local(legs: usize) -> Self {
         Self {
             address: ([127, 0, 0, 1], 0).into(),

@@ -61,7 +61,6 @@ pub struct Event {
 
 impl Event {
     /// Whether the client has disconnected.
-    #[must_use]
     pub const fn ends(&self) -> bool {
         matches!(self.what, What::Closed | What::Gone(_, true))
     }

@@ -52,7 +52,6 @@ impl<const N: usize> StorageRequest<N> {
     }
 
     /// Number of stored models after success, if it changes.
-    #[must_use]
     pub(crate) fn generation(&self) -> Option<u32> {
         match self.what {
             StoreCommand::Defaults => Some(0),
@@ -88,7 +87,6 @@ pub(crate) struct Flashing<const N: usize> {
 
 impl<const N: usize> Flashing<N> {
     /// Creates the state without a request.
-    #[must_use]
     pub fn new() -> Self {
         Self {
             storing: Storing::new(),
@@ -106,7 +104,6 @@ impl<const N: usize> Flashing<N> {
     }
 
     /// Whether a store request is in progress.
-    #[must_use]
     pub(crate) fn is_under_way(&self) -> bool {
         self.requested.is_some()
     }
@@ -119,7 +116,6 @@ impl<const N: usize> Flashing<N> {
     }
 
     /// Whether the processor stalls.
-    #[must_use]
     pub(crate) fn stands(&self, now_ns: u64) -> bool {
         now_ns < self.until_ns
     }

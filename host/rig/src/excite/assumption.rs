@@ -56,7 +56,6 @@ pub fn assumed(leg: &LegFile, assumption: Assumption) -> Result<(LegFile, &'stat
 }
 
 /// Leg with a rotor inertia for every joint that states none, and a line about each; `None` if all state one.
-#[must_use]
 pub fn with_rotors<const N: usize, const B: usize>(leg: &LegFile) -> Option<(LegFile, Vec<String>)> {
     let stated = |joint: &JointFile| joint.prior.or(joint.truth).is_none_or(|link| link.rotor_inertia > 0.0);
     if leg.joints.iter().all(stated) {

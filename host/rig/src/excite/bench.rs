@@ -48,7 +48,6 @@ pub const MOST_EVALUATIONS: u32 = 10_000_000;
 
 impl ExciteOptions {
     /// Options for the leg as its file states it, with its best description.
-    #[must_use]
     pub(crate) fn plain(design: DesignOptions, margin_percent: f64) -> Self {
         let (given, torque_noise_percent, carried) = (None, None, Vec::new());
         Self { design, given, torque_noise_percent, carried, margin_percent, assumption: Assumption::Best }
@@ -188,7 +187,6 @@ impl<const N: usize, const B: usize> Bench<N, B> {
 
     /// The best of 300 random motions, and whether it keeps the torque limits of a design. As many
     /// cycles as fit the duration; fewer where the limits slow the motion down.
-    #[must_use]
     pub fn random(&self, duration_s: f64, cycles: u32) -> Option<(Rehearsal<N, B>, bool)> {
         let steady = duration_s - 2.0 * f64::from(BLEND_S);
         let period = Second((steady / f64::from(cycles)) as f32);

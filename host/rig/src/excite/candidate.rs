@@ -23,7 +23,6 @@ const LEAST_SHARE: f64 = 0.3;
 pub(crate) const PER_JOINT: usize = 2 * HARMONICS + 2;
 
 /// Curve at a point of the box; `None` only if the coordinates define no curve.
-#[must_use]
 pub fn curve<const N: usize>(
     coordinates: &[f64],
     period: Second,

@@ -41,13 +41,11 @@ pub(crate) struct Demand {
 
 impl Demand {
     /// Largest magnitude of motion and approach, N m.
-    #[must_use]
     pub(crate) fn largest(&self) -> f64 {
         self.bound_nm.max(self.approach_nm)
     }
 
     /// The limit that is exceeded most, if any; `joint` counts from 0.
-    #[must_use]
     pub(crate) fn obstacle(&self, joint: usize, limit_nm: f64) -> Option<Obstacle> {
         let torque = |limit: Limit, value: f64| Obstacle { joint, limit, value, allowed: limit_nm };
         let cut = Obstacle {
@@ -63,14 +61,12 @@ impl Demand {
     }
 
     /// Whether the torque is below a limit, N m and never reduced by the monitor.
-    #[must_use]
     pub(crate) fn is_within(&self, limit_nm: f64) -> bool {
         self.largest() <= limit_nm && self.cut.by_nm <= 0.0
     }
 }
 
 /// Torque at every tick of the motion, and on its approaches.
-#[must_use]
 pub(crate) fn demand<const N: usize, const B: usize>(
     scorer: &Scorer<N, B>,
     configuration: &LegConfiguration<N, B>,

@@ -169,7 +169,6 @@ fn note<const N: usize>(largest: &mut Option<Obstacle>, joint: usize, servo: &Se
 
 impl<const N: usize, const B: usize> Rehearsal<N, B> {
     /// Expected identification at this noise of each joint's logged torque, N m.
-    #[must_use]
     pub(crate) fn at_noise(&self, noise_nm: &[f64; N]) -> Expectation<N, B> {
         let mut record = self.record.clone();
         add_noise(&mut record, noise_nm);

@@ -45,7 +45,6 @@ pub(crate) struct Obstacle {
 
 impl Obstacle {
     /// Obstacle of a motion that is not within its envelope.
-    #[must_use]
     pub(crate) fn from_motion(violation: &LimitViolation) -> Self {
         Self {
             joint: violation.joint,
@@ -56,7 +55,6 @@ impl Obstacle {
     }
 
     /// Value over what is allowed, above 1.
-    #[must_use]
     pub(crate) fn excess(&self) -> f64 {
         let (value, allowed) = (self.value.abs(), self.allowed.abs());
         match self.limit {
@@ -70,7 +68,6 @@ impl Obstacle {
 
     /// Sentence: joint, value, limit, key, and what to do. `inertia` is the largest that the joint moves,
     /// kg m2, and `margin` the share that is added to the torque.
-    #[must_use]
     pub fn words(&self, leg: &LegFile, inertia: f64, margin: f64) -> String {
         let Some(joint) = leg.joints.get(self.joint) else { return String::new() };
         let (value, allowed) = (self.value, self.allowed);

@@ -82,7 +82,6 @@ pub(crate) struct Score<const N: usize> {
 
 impl<const N: usize, const B: usize> Scorer<N, B> {
     /// Creates a scorer for rows of a bandwidth; `None` if the filter cannot be built.
-    #[must_use]
     pub fn new(
         model: RowModel<f64, N, B>,
         values: [f64; B],
@@ -103,7 +102,6 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
     }
 
     /// Base rows at one state, N m per unit.
-    #[must_use]
     pub(crate) fn rows(&self, state: &MotionState<N>) -> [[f64; B]; N] {
         let state = Smoothed {
             position: state.position_rad.map(f64::from),
@@ -115,7 +113,6 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
     }
 
     /// Torque of one row, and its error bound.
-    #[must_use]
     pub fn torque(&self, row: &[f64; B]) -> (f64, f64) {
         let terms = row.iter().zip(&self.values).map(|(element, value)| element * value);
         let (sum, absolute) =
@@ -125,7 +122,6 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
 
     /// Reduction of a joint's torque by the monitor at one instant; the monitor must still be able to stop
     /// the joint.
-    #[must_use]
     pub(crate) fn cut(
         &self,
         joint: usize,
@@ -155,7 +151,6 @@ impl<const N: usize, const B: usize> Scorer<N, B> {
     }
 
     /// Scores `cycles` cycles of a curve.
-    #[must_use]
     pub(crate) fn score(&self, curve: &Fourier<N>, cycles: u32) -> Score<N> {
         let rows = ((f64::from(curve.period().0) * SPEED_RATE_HZ) as usize / SPEEDS_PER_ROW).max(8);
         let speeds = rows * SPEEDS_PER_ROW;
@@ -225,7 +220,6 @@ fn add_square<const B: usize>(sum: &mut SMatrix<f64, B, B>, row: &[f64; B]) {
 }
 
 /// ln det of the leading `rank` rows and columns of a symmetric matrix given by its lower half.
-#[must_use]
 pub(crate) fn log_determinant<const B: usize>(lower: &SMatrix<f64, B, B>, rank: usize) -> f64 {
     let mut scaled = SMatrix::<f64, B, B>::identity();
     let mut merit = 0.0;

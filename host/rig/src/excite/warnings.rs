@@ -16,7 +16,6 @@ const WIDE_DEG: f64 = 200.0;
 const LOST_SHARE: f64 = 0.4;
 
 /// Warnings to be read before the motion is run.
-#[must_use]
 pub fn warnings(
     leg: &LegFile,
     noise: NoiseOrigin,

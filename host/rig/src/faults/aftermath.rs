@@ -29,7 +29,6 @@ const OPEN: Contacts = Contacts { enabling: false, start: false };
 pub(crate) const RESET: u64 = STEPS[0].0 + STEPS[1].0 + STEPS[2].0 + STEPS[3].0;
 
 /// Contacts of the operator, `since` periods after the start of the reset.
-#[must_use]
 pub(crate) fn hand(since: u64) -> Contacts {
     let mut left = since;
     for (periods, hand) in STEPS {
@@ -42,7 +41,6 @@ pub(crate) fn hand(since: u64) -> Contacts {
 }
 
 /// Safe states that a fault may lead to.
-#[must_use]
 pub(crate) fn leads_to(code: FaultCode) -> &'static [&'static str] {
     use FaultCode as Code;
     match code {

@@ -49,7 +49,6 @@ pub struct Fault {
 
 impl Fault {
     /// Whether this state, or the one instead, is reached by `state`.
-    #[must_use]
     pub(crate) fn leads_to(&self, reached: impl Fn(&str) -> bool) -> bool {
         reached(self.state) || self.instead.is_some_and(reached)
     }
@@ -88,7 +87,6 @@ macro_rules! catalogue {
 pub static ON_THE_CHIP: [&Fault; 5] = [&B6, &K2, &K4, &K5, &M1];
 
 /// Index of a fault in the catalogue.
-#[must_use]
 pub(crate) fn index_of(id: &str) -> Option<usize> {
     ALL.iter().position(|fault| fault.id == id)
 }

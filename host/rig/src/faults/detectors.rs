@@ -57,7 +57,6 @@ pub(super) fn views(row: &'static Row, rows: &[Entry]) -> Vec<Blind> {
 }
 
 /// Detector reports of a blind campaign; empty for another.
-#[must_use]
 pub(crate) fn detectors(rows: &[Entry], campaign: &Campaign) -> Vec<DetectorReport> {
     if campaign.singly.is_empty() {
         return Vec::new();
@@ -98,13 +97,11 @@ fn detector(code: FaultCode, rows: &[Entry], campaign: &Campaign) -> DetectorRep
 impl DetectorReport {
     /// Returns whether a campaign would change if the code broke: without it, some runs are missed or
     /// reported by another code.
-    #[must_use]
     pub const fn is_noticed(&self) -> bool {
         self.missed_without + self.seen_by_others > 0
     }
 
     /// Summary in one line.
-    #[must_use]
     pub fn line(&self) -> String {
         let Self { code, seen, missed_without, seen_by_others, unjudged_without, .. } = self;
         format!(

@@ -13,13 +13,11 @@ pub(crate) const AMPERE_PER_CODE: f64 = 0.040_283;
 pub(crate) const VOLT_PER_CODE: f64 = 3.3 * SenseScale::DIVIDER as f64 / 4096.0;
 
 /// Creates an injection.
-#[must_use]
 pub(crate) const fn at(channel: Channel, joint: usize, form: Form, timing: Timing) -> Injection {
     Injection { channel, joint, form, timing }
 }
 
 /// A run with one injection that is a fault from the start.
-#[must_use]
 pub(crate) const fn one(injection: Injection, expected: Expected) -> Scenario {
     Scenario {
         injections: [Some(injection), None],
@@ -35,7 +33,6 @@ pub(crate) const fn one(injection: Injection, expected: Expected) -> Scenario {
 }
 
 /// A run with an event besides the ports.
-#[must_use]
 pub(crate) const fn beside(event: Event, expected: Expected) -> Scenario {
     let nothing = at(Channel::Bus, 0, Form::Off, Timing::from(u64::MAX));
     Scenario { injections: [None; 2], event, ..one(nothing, expected) }

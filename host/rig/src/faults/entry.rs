@@ -16,7 +16,6 @@ pub enum Entry {
 
 impl Entry {
     /// The row's fault.
-    #[must_use]
     pub const fn fault(&self) -> &'static Fault {
         match self {
             Self::Forked(row) => row.fault,
@@ -27,7 +26,6 @@ impl Entry {
     /// Returns whether the row's detector is disabled in a blind campaign: the codes of a fork, the caps of
     /// H1, the switch of each bench. The range of J1 is widened on its bench only, not in its forks. B7 has
     /// no single detector.
-    #[must_use]
     pub fn can_be_blind(&self) -> bool {
         match self {
             Self::Forked(row) => row.fault.id != "J1",
@@ -37,7 +35,6 @@ impl Entry {
 }
 
 /// All rows, in the catalogue's order.
-#[must_use]
 pub fn entries() -> Vec<Entry> {
     let mut all: Vec<Entry> =
         ROWS.iter().map(Entry::Forked).chain(BENCHES.iter().map(Entry::Bench)).collect();

@@ -71,7 +71,6 @@ pub struct Stretch {
 
 impl HoursReport {
     /// Report of all stretches.
-    #[must_use]
     pub fn new(stretches: &[Stretch]) -> Self {
         let periods: u64 = stretches.iter().map(|stretch| stretch.periods).sum();
         Self {
@@ -85,7 +84,6 @@ impl HoursReport {
     }
 
     /// Lines for a terminal.
-    #[must_use]
     pub fn lines(&self) -> String {
         let hours = self.hours.known().unwrap_or(0.0);
         let mut text = format!(

@@ -83,7 +83,6 @@ pub(crate) struct Invariants<const N: usize> {
 
 impl<const N: usize> Invariants<N> {
     /// Invariants of a run of this leg.
-    #[must_use]
     pub fn new<const B: usize>(leg: &LegFile, scope: Scope, rig: &Rig<N, B>) -> Self {
         let counts_per_rad = core::array::from_fn(|joint| counts_per_rad(&leg.joints[joint]));
         Self {
@@ -228,7 +227,6 @@ impl<const N: usize> Invariants<N> {
     }
 
     /// Descriptions of the broken invariants.
-    #[must_use]
     pub(crate) fn into_broken(self) -> Vec<String> {
         self.broken
     }

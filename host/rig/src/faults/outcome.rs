@@ -68,7 +68,6 @@ pub struct Manner {
 
 impl Manner {
     /// Returns whether detectors are disabled.
-    #[must_use]
     pub(crate) fn is_blind(&self) -> bool {
         self.blind != Blind::None
     }

@@ -120,7 +120,6 @@ pub struct CampaignReport {
 
 impl CampaignReport {
     /// Creates the report of a campaign.
-    #[must_use]
     pub fn new(entries: &[Entry], campaign: &Campaign) -> Self {
         let mut faults: Vec<&Fault> = entries.iter().map(Entry::fault).collect();
         // A row that is run in two ways is described as its forks are.
@@ -156,7 +155,6 @@ impl CampaignReport {
 
     /// Returns whether the campaign passed: nothing missed or detected only by other detectors, no broken
     /// invariant, no false alarm.
-    #[must_use]
     pub fn is_good(&self) -> bool {
         let calm = self.hours.as_ref().is_none_or(|hours| hours.false_alarms.is_empty());
         calm && self.base_alarms.is_empty()
@@ -165,7 +163,6 @@ impl CampaignReport {
     }
 
     /// Table of the rows.
-    #[must_use]
     pub fn table(&self) -> Table {
         let mut table = Table::with_class("any")
             .text(["fault", "what"])
@@ -191,7 +188,6 @@ fn number(value: Number, digits: usize) -> String {
 
 impl RowReport {
     /// Returns whether a campaign with this row fails: a run was missed, or its own detectors never reported.
-    #[must_use]
     pub fn is_noticed(&self) -> bool {
         self.missed > 0 || self.detected > 0 && self.seen_by_own == 0
     }
@@ -315,7 +311,6 @@ fn row_report(row: &Fault, outcomes: &[Outcome]) -> RowReport {
 
 impl CampaignReport {
     /// Notes below the table: gaps, failures, and the hash.
-    #[must_use]
     pub fn notes(&self) -> String {
         let mut text = String::new();
         for row in &self.rows {
@@ -369,7 +364,6 @@ impl CampaignReport {
 }
 
 /// Describes a run in one line.
-#[must_use]
 pub fn line(outcome: &Outcome) -> String {
     let verdict = match outcome {
         Outcome { detected: true, .. } => "seen",

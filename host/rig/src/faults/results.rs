@@ -59,7 +59,6 @@ impl Campaign {
     }
 
     /// Results of all shards of a campaign of these rows.
-    #[must_use]
     pub fn joined(parts: Vec<ShardResults<Self>>, rows: &[Entry]) -> Self {
         let mut campaign = Self::default();
         for part in parts {
@@ -87,19 +86,16 @@ impl Campaign {
     }
 
     /// Number of runs.
-    #[must_use]
     pub fn runs(&self) -> usize {
         self.outcomes.len() + self.trials.len() + self.singly.len()
     }
 
     /// Duration of motion without a fault, s.
-    #[must_use]
     pub(crate) fn undisturbed_s(&self) -> f64 {
         self.bases.iter().fold(0.0, |sum, base| sum + base.periods as f64 / PERIODS_PER_S as f64)
     }
 
     /// Faults reported during it.
-    #[must_use]
     pub(crate) fn base_alarms(&self) -> Vec<String> {
         let of = |base: &Base| {
             let alarm = base.alarm.as_ref()?;

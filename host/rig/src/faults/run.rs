@@ -31,7 +31,6 @@ const REFUSED: u64 = PERIODS_PER_S / 2;
 const HANDS: u64 = 6 * PERIODS_PER_S;
 
 /// Runs a fork of `base` with the faults of the scenario.
-#[must_use]
 pub fn run<const B: usize>(
     leg: &LegFile,
     row: &'static Row,

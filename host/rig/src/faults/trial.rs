@@ -107,7 +107,6 @@ fn is_one_for_all(channel: Channel) -> bool {
 
 impl Trial {
     /// Draws one run of the sweep.
-    #[must_use]
     pub(crate) fn sweep(seed: u64) -> Self {
         let mut random = Random::new("S", seed);
         let way = (seed - 1) % WAYS;
@@ -115,7 +114,6 @@ impl Trial {
     }
 
     /// Draws one run of two faults.
-    #[must_use]
     pub(crate) fn pair(seed: u64, bounds: &Bounds) -> Self {
         let mut random = Random::new("PP", seed);
         let mut trial = Self { kind: KINDS[1], ..Self::default() };
@@ -146,7 +144,6 @@ impl Trial {
     }
 
     /// Runs on a fork of `base`; `recorded` records its curves.
-    #[must_use]
     pub fn run<const B: usize>(
         &self,
         leg: &LegFile,

@@ -19,31 +19,26 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     }
 
     /// Inhibit word.
-    #[must_use]
     pub(crate) fn causes(&self) -> u32 {
         self.board.signals.inhibit.causes()
     }
 
     /// Commands of the last period.
-    #[must_use]
     pub fn commands(&self) -> &[AxisCommand; N] {
         &self.board.registers.commands
     }
 
     /// Actions of the operator that may lead to an enabled drive.
-    #[must_use]
     pub(crate) fn edges(&self) -> Edges {
         self.edges
     }
 
     /// Encoder counts of the joints at the servo's last tick.
-    #[must_use]
     pub(crate) fn counts(&self) -> [i32; N] {
         self.board.signals.statistics.counts.each_ref().map(|count| count.get().cast_signed())
     }
 
     /// State of the drive.
-    #[must_use]
     pub fn state(&self) -> DriveState {
         if self.board.signals.has_begun() {
             self.leg.control().state()
@@ -53,7 +48,6 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     }
 
     /// Fault reported by the firmware: an axis' fault, another inhibit reason, or the leg's fault.
-    #[must_use]
     pub(crate) fn alarm(&self) -> Option<FaultCode> {
         let cause = || InhibitReason::ALL.into_iter().find(|cause| self.causes() & cause.bit() != 0);
         self.axis_fault
@@ -62,20 +56,17 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     }
 
     /// Requested current of a joint, A; zero while the drive is off.
-    #[must_use]
     pub(crate) fn requested(&self, joint: usize) -> f64 {
         let target = self.board.signals.target(joint);
         if target.enabled { f64::from(target.current.0) } else { 0.0 }
     }
 
     /// Returns whether both motors brake.
-    #[must_use]
     pub(crate) fn is_braking(&self) -> bool {
         self.board.registers.commands.iter().all(|command| *command == AxisCommand::BRAKE)
     }
 
     /// Returns whether any bridge switches.
-    #[must_use]
     pub(crate) fn is_switching(&self) -> bool {
         self.board.registers.commands.iter().any(|command| command.enabled)
     }

@@ -105,7 +105,6 @@ impl<const N: usize, const B: usize> Rig<N, B> {
     }
 
     /// Returns whether the watchdog has reset the board.
-    #[must_use]
     pub(crate) fn is_restarted(&self) -> bool {
         self.restarted
     }

@@ -43,7 +43,6 @@ fn workspace() -> &'static Path {
 }
 
 /// Directory of all builds.
-#[must_use]
 pub fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
 }
@@ -92,7 +91,6 @@ pub(crate) fn write_if_changed(path: &Path, text: &str) -> Result<PathBuf, ToolE
 }
 
 /// Build command for the microcontroller; with `log` the image sends every sample of the 500 Hz log.
-#[must_use]
 pub fn firmware_build(log: bool) -> Command {
     let mut command = Command::new(workspace().join("scripts/firmware-build"));
     command.env("DEFMT_LOG", "info");

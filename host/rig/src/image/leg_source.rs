@@ -114,7 +114,6 @@ fn table(motion: &Periodic<JOINTS>) -> ExcitationTable<JOINTS> {
 }
 
 /// Constant as Rust source, to be included where `crate` is the firmware.
-#[must_use]
 pub fn source(description: &LegDescription<JOINTS>) -> String {
     let has_direction = description.joints.iter().any(|joint| joint.motor.absolute.joint.is_some());
     let direction = if has_direction { "use crate::motor::Direction::*;\n" } else { "" };

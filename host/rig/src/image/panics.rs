@@ -173,7 +173,6 @@ impl Panics {
     }
 
     /// Violations in interrupts, in words.
-    #[must_use]
     pub fn missed(&self) -> Vec<String> {
         let others = self.interrupts.iter().filter(|site| !site.is_of_a_queue());
         let text = |site: &PanicSite| {
@@ -183,7 +182,6 @@ impl Panics {
     }
 
     /// Summary.
-    #[must_use]
     pub fn text(&self) -> String {
         let functions: BTreeSet<&str> = self.all.iter().map(|site| &*site.within).collect();
         let mut text = format!(

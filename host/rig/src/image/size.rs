@@ -104,25 +104,21 @@ impl ImageSize {
     }
 
     /// Bytes in flash.
-    #[must_use]
     pub fn flash(&self) -> u64 {
         self.sections.iter().map(|section| section.flash).sum()
     }
 
     /// Bytes in memory without the stack.
-    #[must_use]
     pub fn memory(&self) -> u64 {
         self.sections.iter().map(|section| section.memory).sum()
     }
 
     /// Bytes in core-coupled memory.
-    #[must_use]
     pub(crate) fn core_coupled(&self) -> u64 {
         self.sections.iter().map(|section| section.core_coupled).sum()
     }
 
     /// Missed goals, in words.
-    #[must_use]
     pub fn missed(&self) -> Vec<String> {
         let goals = [
             ("flash", self.flash(), FLASH_LIMIT),
@@ -134,7 +130,6 @@ impl ImageSize {
     }
 
     /// Warning about little free flash.
-    #[must_use]
     pub fn warning(&self) -> Option<String> {
         let share = self.flash() as f64 / FLASH_LIMIT as f64;
         let free = FLASH_LIMIT.saturating_sub(self.flash());
@@ -143,7 +138,6 @@ impl ImageSize {
     }
 
     /// Formats the size as tables.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut sections = Table::default().label("section").numbers(["flash", "memory", "core-coupled"]);
         let cell = |bytes: u64| if bytes == 0 { String::new() } else { bytes.to_string() };

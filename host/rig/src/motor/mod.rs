@@ -92,7 +92,6 @@ impl Bench {
     }
 
     /// Limits a current to the axis' limit, A.
-    #[must_use]
     pub(crate) fn within_limit(&self, current: f64) -> f64 {
         current.min(f64::from(self.configuration.current_limit.0))
     }
@@ -124,7 +123,6 @@ pub struct Rig {
 
 impl Rig {
     /// Adds the board's brake chopper.
-    #[must_use]
     pub(crate) fn with_chopper(mut self) -> Self {
         self.chopper = Chopper::new(BRAKE[0], BRAKE[1]);
         self

@@ -41,7 +41,6 @@ fn shape(values: &[f64]) -> Shape {
 }
 
 /// Response of the designed bandwidth.
-#[must_use]
 pub(crate) fn response(bandwidth_hz: f64) -> Vec<f64> {
     let gain = TAU * bandwidth_hz * PERIOD_S;
     let mut values = vec![0.0, 0.0];
@@ -52,7 +51,6 @@ pub(crate) fn response(bandwidth_hz: f64) -> Vec<f64> {
 }
 
 /// Shape of the designed response.
-#[must_use]
 pub(crate) fn designed(bandwidth_hz: f64) -> Shape {
     shape(&response(bandwidth_hz))
 }

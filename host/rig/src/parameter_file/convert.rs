@@ -110,7 +110,6 @@ impl Parameters {
     }
 
     /// Values in a fixed order.
-    #[must_use]
     pub(crate) fn to_array(self) -> [f64; 14] {
         let Self { xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ia, fc, fv, off } = self;
         [xx, xy, xz, yy, yz, zz, hx, hy, hz, m, ia, fc, fv, off]

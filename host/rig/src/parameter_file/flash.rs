@@ -122,7 +122,6 @@ fn foreign(memory: &Memory) -> Option<String> {
 impl ParameterFile {
     /// Contents of a board's flash. Each part is read from a copy, so repairs by the store neither hide
     /// another part nor are written.
-    #[must_use]
     pub fn from_flash(memory: &Memory) -> FlashContents {
         let mut found = FlashContents {
             file: Self { schema: PARAMETER_SCHEMA, ..Self::default() },

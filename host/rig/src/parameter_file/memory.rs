@@ -28,14 +28,12 @@ pub struct Memory {
 const KEYS: [Key; 2] = [Key::Objects1, Key::Objects2];
 
 /// Name of a stored model in messages.
-#[must_use]
 pub(crate) fn model_name(key: Key) -> &'static str {
     if key == Key::WornModel { "the stored model of the worn leg" } else { "the stored model" }
 }
 
 impl Memory {
     /// Creates a flash with this content, or an erased one.
-    #[must_use]
     pub fn new(bytes: Option<&[u8]>) -> Self {
         let mut flash = Cells::new(1);
         if let Some(bytes) = bytes {
@@ -62,7 +60,6 @@ impl Memory {
     }
 
     /// Bytes programmed or erased so far, and number of erased sectors.
-    #[must_use]
     pub fn worked(&self) -> (u64, u32) {
         self.flash.as_ref().map_or((0, 0), |flash| (flash.worked(), flash.erasures().iter().sum()))
     }

@@ -17,7 +17,6 @@ const HEAD: &str = "\
 
 impl ParameterFile {
     /// TOML text that [`ParameterFile::parse`] reads back unchanged.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         let mut out = String::from(HEAD);
         line(&mut out, "schema", self.schema);

@@ -216,7 +216,6 @@ pub struct InteractionCurve {
 
 impl AssistReport {
     /// What failed: refused models, energy, rest, faults, stability; empty if nothing did.
-    #[must_use]
     pub fn failures(&self) -> Vec<String> {
         let mut failures = Vec::new();
         if let Some(refused) = self.refused.first() {

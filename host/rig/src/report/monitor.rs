@@ -122,7 +122,6 @@ impl MonitorRun {
 
     /// Whether the run met its requirements: a model, no false alarm, and a change that was detected and
     /// correctly explained. After the update there is no alarm, unless the change continued.
-    #[must_use]
     pub fn is_as_it_should_be(&self) -> bool {
         let quiet = self.still_changing || !self.alarm_after_update;
         let explained = self.update.as_ref().is_some_and(|update| update.right) && quiet;

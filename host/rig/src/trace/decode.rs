@@ -99,7 +99,6 @@ impl Decoder {
     }
 
     /// Frames that were decoded.
-    #[must_use]
     pub(crate) fn decoded(&self) -> u64 {
         self.decoded
     }
@@ -132,7 +131,6 @@ impl Decoder {
 
 impl Skipped {
     /// Summary in words; `None` where everything decoded.
-    #[must_use]
     pub(crate) fn words(&self) -> Option<String> {
         let mut words = Vec::new();
         if self.first_bytes > 0 {

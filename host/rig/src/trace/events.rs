@@ -34,7 +34,6 @@ pub struct Event {
 
 impl Event {
     /// One line of the timeline.
-    #[must_use]
     pub fn line(&self) -> String {
         let time = self.time_s.map_or_else(|| format!("{:>10}", ""), |time| format!("{time:10.3}"));
         let mark = match self.weight {
@@ -51,7 +50,6 @@ impl Event {
 }
 
 /// Event of a record; `None` for kinds that do not belong to the timeline.
-#[must_use]
 pub(crate) fn from_record(record: &Received, servo_hz: f64) -> Option<Event> {
     let at = |tick: u32| Some(f64::from(tick) / servo_hz);
     let (time_s, weight, words) = match record {
@@ -123,7 +121,6 @@ fn start(boot: &Boot) -> (Weight, String) {
 }
 
 /// Description of the board.
-#[must_use]
 pub fn board(board: &Board) -> String {
     let version = if board.version == usize::from(u8::MAX) {
         "version not burnt in".into()
@@ -169,7 +166,6 @@ fn crashed(crash: &Crash) -> String {
 }
 
 /// Description of the leg's activity.
-#[must_use]
 pub fn doing(state: &State) -> String {
     let phase = if state.phase == "-" { String::new() } else { format!(", {}", spaced(&state.phase)) };
     let motion = if state.motion == 0 { String::new() } else { format!(" {}", state.motion) };

@@ -75,7 +75,6 @@ impl Statistics {
     }
 
     /// Statistics over all starts; `None` without a record.
-    #[must_use]
     pub fn loops(&self) -> Option<LoopReport> {
         if !self.seen {
             return None;
@@ -102,7 +101,6 @@ impl Statistics {
     }
 
     /// Description, a line each.
-    #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if let Some(loops) = self.loops() {
@@ -142,7 +140,6 @@ impl Statistics {
     }
 
     /// Warnings: missed ticks, lost samples and records.
-    #[must_use]
     pub fn complaints(&self) -> Vec<String> {
         let Some(loops) = self.loops() else { return Vec::new() };
         let missed = [("servo", loops.servo_missed), ("current", loops.current_missed)];

@@ -32,7 +32,6 @@ pub struct Gap {
 
 impl Gap {
     /// Number of missing records.
-    #[must_use]
     pub(crate) fn count(&self) -> u64 {
         u64::from(self.last - self.first) + 1
     }
@@ -99,13 +98,11 @@ impl Trace {
     }
 
     /// Number of lost records.
-    #[must_use]
     pub fn lost(&self) -> u64 {
         self.gaps.iter().map(Gap::count).sum()
     }
 
     /// Servo ticks per second.
-    #[must_use]
     pub(crate) fn servo_hz(&self) -> f64 {
         let announced = self.boot.as_ref().map(|boot| f64::from(boot.servo_hz)).filter(|rate| *rate > 0.0);
         announced.unwrap_or(SERVO_HZ)
@@ -117,7 +114,6 @@ impl Trace {
     }
 
     /// Warnings, in order.
-    #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let events = self.events.iter().filter(|event| event.weight == Weight::Warning);
         let mut words: Vec<String> = events.map(|event| event.words.clone()).collect();
@@ -127,7 +123,6 @@ impl Trace {
     }
 
     /// Explains why a trace has no complete result, and how far it went.
-    #[must_use]
     pub(crate) fn without_result(&self) -> String {
         if self.records == 0 {
             return "contains no trace record".into();

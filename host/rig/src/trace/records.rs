@@ -105,7 +105,6 @@ macro_rules! readers {
 
         impl Kind {
             /// Kind of this name; `None` for one that this version does not know.
-            #[must_use]
             pub fn from_name(name: &str) -> Option<Self> {
                 $( if is_of_kind($format, name) { return Some(Self::$name); } )*
                 None
@@ -130,7 +129,6 @@ macro_rules! readers {
 scarab::trace_records!(readers);
 
 /// Description of an error.
-#[must_use]
 pub(crate) fn words(kind: &str, error: LineError<'_>) -> String {
     match error {
         LineError::Kind => "is no record".into(),

@@ -39,7 +39,6 @@ pub struct ResultRecords {
 
 impl Kind {
     /// Whether records of this kind belong to a result.
-    #[must_use]
     pub(crate) const fn is_of_result(self) -> bool {
         matches!(
             self,
@@ -82,7 +81,6 @@ impl ResultRecords {
     }
 
     /// Reason why the result cannot be reported; `None` for a complete result with a verdict.
-    #[must_use]
     pub(crate) fn lacks(&self) -> Option<String> {
         let read = self.records;
         match (&self.end, &self.verdict, &self.solver) {

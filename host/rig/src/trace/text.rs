@@ -11,7 +11,6 @@ use scarab::trace::{Line, LineError};
 use crate::trace::records::Kind;
 
 /// Record within a line; `None` for a line without one.
-#[must_use]
 pub fn record(line: &str) -> Option<Cow<'_, str>> {
     let line = without_colours(line);
     let (start, end) = span(&line)?;

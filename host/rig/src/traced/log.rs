@@ -55,7 +55,6 @@ pub fn write(trace: &Trace, leg: &LegFile, motion: u8, path: &Path) -> Result<Wr
 }
 
 /// Comma-separated list of the other logged motions; empty without any.
-#[must_use]
 pub fn others(trace: &Trace, motion: u8) -> String {
     let mut numbers: Vec<u8> = trace.log.iter().filter_map(|(_, sample)| number(sample)).collect();
     numbers.sort_unstable();

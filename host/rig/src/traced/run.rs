@@ -61,7 +61,6 @@ pub struct StreamReader {
 
 impl StreamReader {
     /// Creates a reader of frames if there is a decoder, of text otherwise.
-    #[must_use]
     pub fn new(decoder: Option<Decoder>) -> Self {
         Self { decoder, trace: Trace::default(), line: Vec::new(), zeros: 0, text: None }
     }
@@ -151,7 +150,6 @@ fn push(trace: &mut Trace, text: &mut Option<(PathBuf, NewFile)>, line: &str) ->
 }
 
 /// Timeline and loops, printed before the tables.
-#[must_use]
 pub fn preface(trace: &Trace) -> String {
     let mut lines: Vec<String> = trace.events.iter().map(Event::line).collect();
     lines.push(String::new());
@@ -175,7 +173,6 @@ fn count(count: u64, words: &str) -> String {
 }
 
 /// Faults and warnings, printed after everything else.
-#[must_use]
 pub fn attention(trace: &Trace) -> String {
     let faults: Vec<String> = trace.faults().map(|event| format!("  !! {}", event.words)).collect();
     let warnings: Vec<String> = trace.warnings().iter().map(|words| format!("  !  {words}")).collect();

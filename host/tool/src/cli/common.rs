@@ -19,7 +19,6 @@ use crate::cli::leg_options::LegOptions;
 use crate::view::{figures, html, tables};
 
 /// Program that computes a campaign: this one.
-#[must_use]
 pub(crate) fn program() -> Program {
     Program::from_sources(env!("SCARAB_SOURCES"))
 }

@@ -25,7 +25,6 @@ pub(crate) struct Clock {
 
 impl Clock {
     /// Starts a clock with this many seconds of the source per second.
-    #[must_use]
     pub fn new(speed: f64) -> Self {
         let period = Duration::from_nanos(PERIOD_TICKS * TICK_NS).div_f64(4.0 * speed);
         let pace = Pace::new(speed, Instant::now(), 0);

@@ -24,7 +24,6 @@ const HALF_PERIOD_S: f64 = (SERVO_RATE_HZ / RATE_HZ - 1) as f64 / 2.0 / SERVO_RA
 pub(crate) const HALF_SAMPLE_S: f64 = (TICKS_PER_LOG - 1) as f64 / 2.0 / SERVO_RATE_HZ as f64;
 
 /// Description of a source with one leg.
-#[must_use]
 pub(crate) fn scene(leg: &LegFile, source: String, speed: f64) -> Scene {
     let joint = |joint: &JointFile| JointScene { name: joint.name.clone() };
     let joints = leg.joints.iter().map(joint).collect();
@@ -68,25 +67,21 @@ impl<'a, const N: usize> Picture<'a, N> {
     }
 
     /// Reports currents as unknown.
-    #[must_use]
     pub(crate) fn without_currents(self) -> Self {
         Self { has_currents: false, ..self }
     }
 
     /// Reports as the leg with this index in the scene.
-    #[must_use]
     pub(crate) fn at(self, leg_index: usize) -> Self {
         Self { leg_index, ..self }
     }
 
     /// Index of the leg in the scene.
-    #[must_use]
     pub(crate) fn leg_index(&self) -> usize {
         self.leg_index
     }
 
     /// Leg of the picture.
-    #[must_use]
     pub(crate) fn leg(&self) -> &'a LegFile {
         self.leg
     }

@@ -102,7 +102,6 @@ impl<const N: usize, const B: usize> Progress<N, B> {
     }
 
     /// Whether an estimate is due: each second of the motion to identify from.
-    #[must_use]
     pub(crate) fn is_due(&self) -> bool {
         let rows = self.recorder.rows().into_iter().min().unwrap_or(0);
         self.segment == Some(Segment::Training) && rows >= self.estimated + RATE_HZ

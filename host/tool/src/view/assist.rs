@@ -22,7 +22,6 @@ fn percent(part: Number, whole: Number) -> String {
 }
 
 /// Torques of every mode, motion and joint, N m rms.
-#[must_use]
 pub(crate) fn rows(report: &AssistReport) -> Table {
     let is_compared = report.rows.iter().any(|row| row.drives_off_rms_nm.known().is_some());
     let is_carried = report.rows.iter().any(|row| row.wearer_gravity_share.known().is_some());
@@ -63,7 +62,6 @@ pub(crate) fn rows(report: &AssistReport) -> Table {
 }
 
 /// Requested shares of each mode.
-#[must_use]
 pub fn shares(report: &AssistReport) -> Table {
     let mut table = Table::default().label("mode").numbers(["friction", "inertia", "weight", "periodic"]);
     for shares in &report.shares {
@@ -76,7 +74,6 @@ pub fn shares(report: &AssistReport) -> Table {
 }
 
 /// Periodic assistance: the worst of all seeds for each cadence, the mean for the effort.
-#[must_use]
 pub(crate) fn periodic(report: &AssistReport) -> Table {
     let mut table = Table::default().label("cadence, Hz").numbers([
         "lock, cycles",
@@ -109,7 +106,6 @@ pub(crate) fn periodic(report: &AssistReport) -> Table {
 }
 
 /// Base sums of the wearer's leg against anthropometry.
-#[must_use]
 pub(crate) fn wearer_sums(report: &AssistReport) -> Table {
     let is_spread = report.wearer_sums.iter().any(|sum| sum.spread.known().is_some());
     let mut table = Table::default()
@@ -139,7 +135,6 @@ pub(crate) fn wearer_sums(report: &AssistReport) -> Table {
 }
 
 /// Lines about energy, rest, faults and stability; only what was run.
-#[must_use]
 pub(crate) fn notes(report: &AssistReport) -> Vec<String> {
     let mut notes: Vec<String> =
         report.failures().into_iter().map(|failure| format!("FAILED: {failure}")).collect();
@@ -181,7 +176,6 @@ pub(crate) fn notes(report: &AssistReport) -> Vec<String> {
 }
 
 /// Everything for the terminal.
-#[must_use]
 pub fn text(report: &AssistReport) -> String {
     let [first, last] = report.seeds;
     let seeds = if first == last { format!("seed {first}") } else { format!("seeds {first} to {last}") };

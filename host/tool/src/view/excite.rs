@@ -5,7 +5,6 @@ use scarab_base::table::{Table, cells};
 use scarab_identify::report::excite::ExciteReport;
 
 /// Formats the report for standard output.
-#[must_use]
 pub fn report(report: &ExciteReport) -> String {
     let mut lines = vec![
         format!(

@@ -42,7 +42,6 @@ const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src dat
 /// Current time, UTC, in seconds.
 ///
 /// `SOURCE_DATE_EPOCH` (s since 1970) replaces it, for reproducible pages.
-#[must_use]
 pub(crate) fn time_utc() -> String {
     let stated = std::env::var("SOURCE_DATE_EPOCH").ok().and_then(|seconds| seconds.parse().ok());
     let now = stated.and_then(|seconds| Timestamp::from_second(seconds).ok()).unwrap_or_else(Timestamp::now);
@@ -62,13 +61,11 @@ pub struct Circumstances {
 
 impl Circumstances {
     /// Command line of this process and the current time ([`time_utc`]).
-    #[must_use]
     pub(crate) fn now(leg: &LegFile) -> Self {
         Self::from_command(leg, std::env::args().skip(1).filter(|word| word != BY_CARGO))
     }
 
     /// Command line of these words and the current time, as in `Self::now`.
-    #[must_use]
     pub fn from_command(leg: &LegFile, words: impl IntoIterator<Item = String>) -> Self {
         let words: Vec<String> = words.into_iter().map(|word| quoted(&word)).collect();
         Self {

@@ -4,7 +4,6 @@ use scarab_base::table::{Table, cells};
 use scarab_rig::report::motor::MotorReport;
 
 /// Formats all tables.
-#[must_use]
 pub fn tables(report: &MotorReport) -> String {
     let MotorReport { leg, joint, bandwidth_hz, .. } = report;
     let head = format!("{leg}, {joint}: current loop of {bandwidth_hz:.0} Hz at 24 kHz\n");

@@ -23,7 +23,6 @@ pub(crate) struct Spread {
 
 impl Spread {
     /// Spread of every base parameter with a truth, in the order of first appearance.
-    #[must_use]
     pub(crate) fn from_runs(runs: &[RunReport]) -> Vec<Self> {
         let mut names: Vec<&str> = Vec::new();
         for base in runs.iter().flat_map(|run| &run.base_parameters) {
@@ -56,20 +55,17 @@ impl Spread {
     }
 
     /// Mean error in sigma.
-    #[must_use]
     pub(crate) fn mean(&self) -> f64 {
         self.errors.iter().sum::<f64>() / self.errors.len().max(1) as f64
     }
 
     /// Standard deviation of the errors about their mean, in sigma; 1 if the reported sigma is right.
-    #[must_use]
     pub(crate) fn deviation(&self) -> f64 {
         let mean = self.mean();
         rms(self.errors.iter().map(|error| error - mean))
     }
 
     /// Share of the errors within a number of sigma.
-    #[must_use]
     pub(crate) fn within(&self, sigmas: f64) -> f64 {
         let inside = self.errors.iter().filter(|error| error.abs() <= sigmas).count();
         inside as f64 / self.errors.len().max(1) as f64

@@ -18,7 +18,6 @@ use crate::view::html::parameters::{badge, bar, split};
 use crate::view::html::table::html_cell;
 
 /// Table of the base parameters: value, sigma with its parts, truth and error in sigma.
-#[must_use]
 pub(crate) fn base_parameters(run: &RunReport) -> Table {
     let any = |known: fn(&BaseReport) -> Number| {
         run.base_parameters.iter().any(|base| known(base).known().is_some())
@@ -72,7 +71,6 @@ fn terms(terms: &BTreeMap<String, f64>) -> String {
 }
 
 /// Table of parameters with their status.
-#[must_use]
 pub(crate) fn parameters<'a>(
     parameters: impl Iterator<Item = &'a ParameterReport>,
     is_truth_known: bool,
@@ -103,7 +101,6 @@ pub(crate) fn parameters<'a>(
 }
 
 /// All parameters, and the meaning of their status.
-#[must_use]
 pub(crate) fn all_parameters(run: &RunReport) -> String {
     let truth = run.parameters.iter().any(|parameter| parameter.truth.known().is_some());
     parameters(run.parameters.iter(), truth).to_text()
@@ -115,7 +112,6 @@ pub(crate) fn all_parameters(run: &RunReport) -> String {
 }
 
 /// Table of the torque errors on all motions; `joint` names a joint.
-#[must_use]
 pub(crate) fn fits(run: &RunReport, joint: impl Fn(usize) -> String) -> Table {
     // Figures use this name for the motion identified from, too: an unused one may have the same course.
     let is_recorded = run.seed.is_none() && run.trace.is_none();
@@ -146,7 +142,6 @@ pub(crate) fn fits(run: &RunReport, joint: impl Fn(usize) -> String) -> Table {
 }
 
 /// Table of the training and validation files, with the rows used for each joint.
-#[must_use]
 pub(crate) fn sources(sources: &[Source]) -> Table {
     let joints = sources.first().map_or(0, |source| source.used.len());
     let mut table = Table::default()
@@ -168,7 +163,6 @@ pub(crate) fn sources(sources: &[Source]) -> Table {
 }
 
 /// Table of the columns and conversions of the files, if any differs from the documented format.
-#[must_use]
 pub(crate) fn conversions(read: &[ReadReport]) -> Option<Table> {
     let mut table = Table::default().text(["file", "signal", "column", "unit", "times", "by"]);
     let mut files: Vec<&ReadReport> = Vec::new();
@@ -192,7 +186,6 @@ pub(crate) fn conversions(read: &[ReadReport]) -> Option<Table> {
 }
 
 /// Format and skipped rows of the same files, one line each.
-#[must_use]
 pub fn reading_notes(read: &[ReadReport]) -> Vec<String> {
     let mut lines = Vec::new();
     for file in read.iter().filter(|file| file.is_notable()) {
@@ -223,7 +216,6 @@ pub(crate) fn print_run(run: &RunReport, leg: &LegFile) -> Result<(), ToolError>
 }
 
 /// Tables and verdict of one run of a leg.
-#[must_use]
 pub fn run_text(run: &RunReport, leg: &LegFile) -> String {
     let joint = |number: usize| {
         let file = number.checked_sub(1).and_then(|index| leg.joints.get(index));
@@ -278,7 +270,6 @@ pub fn run_text(run: &RunReport, leg: &LegFile) -> String {
 }
 
 /// Sentence of a failed test, or the name of the likely cause that says the same.
-#[must_use]
 pub(crate) fn failure(run: &RunReport, finding: &FindingReport) -> String {
     let cause = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref());
     match cause.filter(|cause| cause.says(finding)) {
@@ -288,7 +279,6 @@ pub(crate) fn failure(run: &RunReport, finding: &FindingReport) -> String {
 }
 
 /// Comparison with a stored model, and the mass that explains the difference.
-#[must_use]
 pub(crate) fn comparison_lines(compared: &ComparisonReport) -> Vec<String> {
     let mut lines = vec![format!(
         "compared with {}: {} (chi-square {} of at most {})",
@@ -343,7 +333,6 @@ fn search_line(run: &RunReport) -> String {
 }
 
 /// Formats chi-square units above an optimum; smaller ones than 1e-6 are rounding.
-#[must_use]
 pub(crate) fn excess(units: Number) -> String {
     match units.known() {
         Some(units) if units.abs() < 1e-6 => "< 1e-6".into(),
@@ -375,7 +364,6 @@ fn consistent_line(run: &RunReport) -> String {
 }
 
 /// Explanation of a reason from the closed list.
-#[must_use]
 pub(crate) fn explanation(reason: &str) -> &'static str {
     match reason {
         "unphysical" => {
@@ -395,7 +383,6 @@ pub(crate) fn explanation(reason: &str) -> &'static str {
 }
 
 /// Verdict in words.
-#[must_use]
 pub fn verdict_line(run: &RunReport) -> String {
     let seconds = if run.simulated_s > 0.0 && run.wall_s > 0.0 {
         format!(" ({:.1} s of motion in {:.2} s)", run.simulated_s, run.wall_s)

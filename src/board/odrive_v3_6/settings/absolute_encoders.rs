@@ -32,7 +32,6 @@ const SECOND: [Pin; 2] =
     [pin(b'C', INDEX_LINES[0], Mode::Output(true)), pin(b'C', INDEX_LINES[1], Mode::Output(true))];
 
 /// Select line of an encoder, low while it is selected; `None` without that encoder.
-#[must_use]
 pub fn select(axis: usize, side: AbsoluteEncoderSide, encoders: AbsoluteEncoders) -> Option<Pin> {
     let lines = match side {
         AbsoluteEncoderSide::Rotor if encoders.rotor => &FIRST,

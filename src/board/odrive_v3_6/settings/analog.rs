@@ -21,7 +21,6 @@ pub const HOTTEST_C: f32 = 100.0;
 pub const THERMISTOR_CODES: [u16; 2] = [100, 3700];
 
 /// Divider ratio of the bus voltage on a board of this version; `None` for versions of other boards.
-#[must_use]
 pub const fn divider(version: [u8; 3]) -> Option<f32> {
     match version {
         [3, 5 | 6, 56 | 48] => Some(SenseScale::DIVIDER),
@@ -31,7 +30,6 @@ pub const fn divider(version: [u8; 3]) -> Option<f32> {
 }
 
 /// Version of a board without a factory entry that the user states to be one of 24 or 56 V.
-#[must_use]
 pub const fn stated(volts: Option<&str>) -> [u8; 3] {
     match volts {
         Some(text) => match text.as_bytes() {
@@ -44,13 +42,11 @@ pub const fn stated(volts: Option<&str>) -> [u8; 3] {
 }
 
 /// Scales of amplifiers, converter and divider for the current loop.
-#[must_use]
 pub const fn sense(divider: f32) -> SenseScale {
     SenseScale { volt_per_code: Volt(3.3 / 4096.0 * divider), ..SenseScale::ODRIVE_3_6 }
 }
 
 /// Temperature of a thermistor's code, degrees Celsius; `None` where it is open or shorted.
-#[must_use]
 pub fn temperature_c(code: u16) -> Option<f32> {
     let [low, high] = THERMISTOR_CODES;
     let [a, b, c, d] = THERMISTOR;

@@ -71,7 +71,6 @@ pub const BEGIN: [Write; 1] = [Write::whole("CAN_MCR", MCR, 1 << 6 | 1 << 3 | 1 
 
 /// Sets bit rate, one filter and interrupts. The controller takes part once the bus was silent for eleven
 /// bits. An unsupported rate is replaced by the default.
-#[must_use]
 pub const fn set_up(kbit: u16) -> [Write; 10] {
     let kbit = if matches!(kbit, 125 | 250 | 500 | 1000) { kbit } else { USUAL_KBIT };
     let prescaler = CLOCK_HZ / QUANTA / (kbit as u32 * 1000);

@@ -36,7 +36,6 @@ pub const CHOPPER: [Write; 7] = [
 
 /// Compare values of the low and the high side for a duty of the resistor. Duties outside 0..=0.95 are
 /// clamped, NaN counts as 0. The values are never less than [`GAP`] apart.
-#[must_use]
 pub fn compare(duty: f32) -> [u16; 2] {
     let on = (duty * TOP as f32) as u32;
     let high = TOP - on.min(TOP * 95 / 100);

@@ -100,7 +100,6 @@ pub const TRIGGERED: [Write; 3] = [
 
 /// Whether ADC1 converts nothing for the next microsecond, by TIM1's control register and counter: the scan
 /// begins at the counter's zero and takes 4.6 us, less than the half period in which the counter rises.
-#[must_use]
 pub const fn is_idle(control: u32, counter: u32) -> bool {
     control & DOWN != 0 && counter > FAST_TIMER_HZ / 1_000_000
 }
@@ -110,7 +109,6 @@ pub const START: u32 = ON | INJECTED | 1 << 30;
 
 /// Axes with an end in ADC2 or ADC3; `Some(true)` where both have one.
 #[inline(always)]
-#[must_use]
 pub const fn finished_axes([one, other]: [u32; 2]) -> [Option<bool>; 2] {
     let (any, both) = (one | other, one & other);
     [
@@ -121,7 +119,6 @@ pub const fn finished_axes([one, other]: [u32; 2]) -> [Option<bool>; 2] {
 
 /// Value that clears flags of a status register: zeros clear, ones do nothing (rc_w0), so a flag raised
 /// meanwhile is not lost.
-#[must_use]
 pub const fn cleared(flags: u32) -> u32 {
     !flags
 }

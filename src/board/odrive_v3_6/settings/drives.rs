@@ -38,13 +38,11 @@ const fn is_low(divider: f32) -> usize {
 }
 
 /// Voltage range of the brake resistor on a board with this bus-voltage divider.
-#[must_use]
 pub const fn chopper(divider: f32) -> [Volt; 2] {
     CHOPPER[is_low(divider)]
 }
 
 /// Bus-voltage range of the bridges on a board with this divider.
-#[must_use]
 pub const fn bus(divider: f32) -> [Volt; 2] {
     BUS[is_low(divider)]
 }
@@ -52,7 +50,6 @@ pub const fn bus(divider: f32) -> [Volt; 2] {
 /// Ramps that reduce torque on a board with this bus-voltage divider. They cover the last 20 degrees of a
 /// bridge, and the bus voltage below 1.2 of its lower limit. A third one lies between the chopper's end and
 /// the upper limit.
-#[must_use]
 pub const fn derating(divider: f32) -> DeratingRamps {
     let ([low, high], [_, full]) = (bus(divider), chopper(divider));
     let above = high.0 - full.0;
@@ -65,7 +62,6 @@ pub const fn derating(divider: f32) -> DeratingRamps {
 
 /// Configuration of an axis that drives this motor, up to a joint's current and speed, on a board with this
 /// bus-voltage divider. A mirrored drive is handled in the servo (`servo::JointScale`).
-#[must_use]
 pub fn axis(
     motor: &MotorDescription,
     current: Ampere,
@@ -93,21 +89,18 @@ pub fn axis(
 }
 
 /// Least travel of a calibration that passes the index, motor turns.
-#[must_use]
 pub fn least_travel_turns(pole_pairs: u8) -> f32 {
     1.01 + ALIGNMENT_TURNS / f32::from(pole_pairs.max(1))
 }
 
 /// Travel of a calibration where the leg file states none, motor turns: 1.25, and more where few pole pairs
 /// would miss the index.
-#[must_use]
 pub fn usual_travel_turns(pole_pairs: u8) -> f32 {
     max(CALIBRATION.travel_turns, least_travel_turns(pole_pairs))
 }
 
 /// Calibrations of a leg's motors in place: the inertia is the largest that the joint moves, seen at the
 /// rotor.
-#[must_use]
 pub fn calibrations<const N: usize>(leg: &LegDescription<N>) -> [CalibrationSettings; N] {
     leg.joints.map(|joint| CalibrationSettings {
         inertia: KilogramMetreSquared(joint.inertia.0 / (joint.motor.ratio * joint.motor.ratio)),
@@ -117,7 +110,6 @@ pub fn calibrations<const N: usize>(leg: &LegDescription<N>) -> [CalibrationSett
 }
 
 /// Configurations of all axes of a leg.
-#[must_use]
 pub fn axes<const N: usize>(leg: &LegDescription<N>, divider: f32) -> [AxisConfiguration; N] {
     leg.joints.map(|joint| axis(&joint.motor, joint.current, joint.speed, divider))
 }

@@ -35,7 +35,6 @@ pub const ENCODERS: [[Write; 5]; 2] = [
 /// `sampled` has the newest count in its lower half. At such a speed a true index, which is at least one
 /// count wide, lasts for 42 us, longer than the interrupt's latency. In motion the line of a true index may
 /// already be low.
-#[must_use]
 pub const fn is_glitch(sampled: u32, count: u16, is_high: bool) -> bool {
     !is_high && sampled as u16 == count && (sampled >> 16) as u16 == count
 }

@@ -27,7 +27,6 @@ pub const EXTERNAL: [Write; 7] = [
 ];
 
 /// Write that masks a line.
-#[must_use]
 pub const fn masked(line: u32) -> Write {
     Write::bits("EXTI_IMR", EXTI, 1 << line, 0)
 }

@@ -25,7 +25,6 @@ const BOR_LEV: u32 = 2;
 
 /// Brown-out reset level in a value of the option control register: 3 resets below 2.83 V (typical, DS8626
 /// table 22), 0 is off, as delivered. The bits count the other way.
-#[must_use]
 pub const fn brown_out_level(options: u32) -> u8 {
     3 - (options >> BOR_LEV & 3) as u8
 }
@@ -36,7 +35,6 @@ const WORDS: u32 = 0b10 << 8;
 pub const PROGRAM: u32 = WORDS | 1;
 
 /// Control value that selects a sector for erasing (SER, SNB).
-#[must_use]
 pub const fn erase(number: u32) -> u32 {
     WORDS | number << 3 | 1 << 1
 }

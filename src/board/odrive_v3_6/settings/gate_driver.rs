@@ -27,19 +27,16 @@ pub enum Register {
 }
 
 /// Frame that writes a register.
-#[must_use]
 pub const fn write(register: Register, data: u16) -> u16 {
     (register as u16) << 11 | data & 0x07FF
 }
 
 /// Frame that reads a register; the answer comes with the next frame.
-#[must_use]
 pub const fn read(register: Register) -> u16 {
     1 << 15 | (register as u16) << 11
 }
 
 /// Data of an answer; `None` without supply.
-#[must_use]
 pub const fn data(answer: u16) -> Option<u16> {
     if answer == FRAME_FAULT { None } else { Some(answer & 0x07FF) }
 }

@@ -34,13 +34,11 @@ pub struct Write {
 
 impl Write {
     /// Writes a whole register.
-    #[must_use]
     pub const fn whole(register: &'static str, address: u32, value: u32) -> Self {
         Self::bits(register, address, u32::MAX, value)
     }
 
     /// Writes some bits of a register.
-    #[must_use]
     pub const fn bits(register: &'static str, address: u32, mask: u32, value: u32) -> Self {
         #[cfg(target_os = "none")]
         let _ = register;
@@ -54,7 +52,6 @@ impl Write {
     }
 
     /// Value of a register after this write, for its value `before`.
-    #[must_use]
     pub const fn applied_to(&self, before: u32) -> u32 {
         (before & !self.mask) | (self.value & self.mask)
     }

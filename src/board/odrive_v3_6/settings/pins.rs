@@ -114,7 +114,6 @@ pub const STATUS_LIGHT: Pin = HOLDING_BRAKE;
 pub const MOTOR_THERMISTORS: [Pin; 2] = [pin(b'A', 0, Mode::Analog), pin(b'A', 1, Mode::Analog)];
 
 /// Address of a port's first register.
-#[must_use]
 pub const fn port(letter: u8) -> u32 {
     0x4002_0000 + 0x400 * (letter as u32 - b'A' as u32)
 }
@@ -126,7 +125,6 @@ pub const BSRR: u32 = 0x18;
 
 impl Pin {
     /// Writes that configure the pin: level, pull, slowest edges, function, and the mode last.
-    #[must_use]
     pub const fn writes(&self) -> [Write; 5] {
         let Self { port: letter, number, mode } = *self;
         let base = port(letter);

@@ -67,7 +67,6 @@ const fn trigger(clocks: i16) -> (u32, u32) {
 }
 
 /// Configures a bridge's timer: stopped, main output off, every phase at one half.
-#[must_use]
 pub const fn bridge(axis: usize) -> [Write; 15] {
     let base = BASES[if axis == 0 { 0 } else { 1 }];
     macro_rules! write {
@@ -101,7 +100,6 @@ pub const fn bridge(axis: usize) -> [Write; 15] {
 }
 
 /// Enables the channels and sets the counters; the last writes before the start.
-#[must_use]
 pub const fn ready() -> [Write; 4] {
     [
         Write::whole("TIM1_CCER", BASES[0] + 0x20, OUTPUTS),
@@ -127,7 +125,6 @@ pub const TRIGGERS: [Write; 3] = [
 ];
 
 /// Takes compare values over at every second end; to be written while the counter falls.
-#[must_use]
 pub const fn repetition(axis: usize) -> Write {
     if axis == 0 {
         Write::whole("TIM1_RCR", BASES[0] + 0x30, 1)
@@ -138,14 +135,12 @@ pub const fn repetition(axis: usize) -> Write {
 
 /// Whether two counters run half a period apart, from three equally spaced reads: the falling counter, the
 /// rising one, the falling one again.
-#[must_use]
 pub fn half_a_period_apart([before, rising, after]: [u16; 3]) -> bool {
     let twice = u32::from(before) + u32::from(after) + 2 * u32::from(rising);
     twice.abs_diff(2 * u32::from(TOP)) <= 2 * u32::from(SHIFT_TOLERANCE)
 }
 
 /// Compare value of a duty. Duties outside 0..=1 are clamped, NaN counts as 0 (low side on).
-#[must_use]
 pub fn compare(duty: f32) -> u16 {
     let high = duty * f32::from(TOP) + 0.5;
     // One instruction converts to 32 bits and saturates; a conversion to 16 bits would compare each limit.

@@ -94,7 +94,6 @@ impl<'a, T: Real> VerdictBuilder<'a, T> {
     }
 
     /// Verdict of the evidence so far.
-    #[must_use]
     pub fn verdict(&self) -> Verdict {
         self.verdict
     }

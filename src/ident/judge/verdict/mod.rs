@@ -65,25 +65,21 @@ impl Verdict {
     pub const ACCEPTED: Self = Self(0);
 
     /// Verdict with one reason.
-    #[must_use]
     pub const fn refused(reason: Reason) -> Self {
         Self(1 << reason as u8)
     }
 
     /// Union of the reasons of both.
-    #[must_use]
     pub(crate) const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
     /// True without any reason against the result.
-    #[must_use]
     pub const fn is_accepted(self) -> bool {
         self.0 == 0
     }
 
     /// True if this is one of the reasons.
-    #[must_use]
     pub const fn has(self, reason: Reason) -> bool {
         self.0 & (1 << reason as u8) != 0
     }

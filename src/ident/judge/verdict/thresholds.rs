@@ -89,14 +89,12 @@ impl<T: Real> Default for Thresholds<T> {
 impl<T: Real> Thresholds<T> {
     /// Limit of chi-square with `freedom` degrees of freedom by chance: a number
     /// of its spreads above its mean.
-    #[must_use]
     pub(crate) fn chance(&self, freedom: T) -> T {
         freedom + self.largest_excess_spreads * crate::real::sqrt(freedom + freedom)
     }
 
     /// Quantile of chi-square over its `freedom` degrees of freedom, at [`Self::noise_quantile`]: the limit
     /// by chance of a measured over an expected variance (Wilson and Hilferty 1931).
-    #[must_use]
     pub(crate) fn variance_ratio(&self, freedom: T) -> T {
         let part = T::from_double(2.0 / 9.0) / crate::real::max(freedom, T::one());
         let root = T::one() - part + self.noise_quantile * crate::real::sqrt(part);

@@ -61,7 +61,6 @@ pub(crate) struct Explanation<T, const B: usize> {
 
 impl<T: Real> Hypothesis<T> {
     /// Hypothesis without any determined parameter.
-    #[must_use]
     pub(crate) fn nothing() -> Self {
         Self {
             values: [T::zero(); DIRECTIONS],
@@ -73,19 +72,16 @@ impl<T: Real> Hypothesis<T> {
     }
 
     /// Standard deviation of one value; `None` where not determined.
-    #[must_use]
     pub fn sigma(&self, index: usize) -> Option<T> {
         self.determined.get(index)?.then(|| self.sigmas.get(index).copied())?
     }
 
     /// True if the remaining residual is noise.
-    #[must_use]
     pub fn explains(&self, thresholds: &Thresholds<T>) -> bool {
         self.chi_square <= thresholds.chance(self.freedom)
     }
 
     /// Akaike's criterion: smaller is better.
-    #[must_use]
     pub(crate) fn score(&self) -> T {
         let free = self.determined.iter().filter(|determined| **determined).count();
         self.chi_square + T::from_double((2 * free) as f64)
@@ -94,7 +90,6 @@ impl<T: Real> Hypothesis<T> {
 
 impl<T: Real, const B: usize> Explanation<T, B> {
     /// Variance of a weighted sum of the values.
-    #[must_use]
     pub(crate) fn variance_of(&self, weights: &[T; DIRECTIONS]) -> T {
         variance(&self.covariance, weights)
     }
@@ -113,7 +108,6 @@ pub(crate) struct Comparison<'a, T, const B: usize> {
 
 impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
     /// Prepares a comparison; `rows` are in units of an independent row's standard deviation.
-    #[must_use]
     #[inline(never)]
     pub fn new(rows: &'a Factor<T, B>, before: &'a Estimate<T, B>, rank: usize) -> Self {
         let triangle = rows.triangle();
@@ -139,13 +133,11 @@ impl<'a, T: Real, const B: usize> Comparison<'a, T, B> {
     }
 
     /// Chi-square and degrees of freedom of the old model.
-    #[must_use]
     pub(crate) fn unchanged(&self) -> (T, T) {
         (dot(&self.whitened, &self.whitened), T::from_double(self.rank as f64))
     }
 
     /// Fits a hypothesis with these free parameters.
-    #[must_use]
     #[inline(never)]
     pub(crate) fn explain<const N: usize>(
         &self,

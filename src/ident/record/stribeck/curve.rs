@@ -8,7 +8,6 @@ use crate::real::{self, Real};
 const FASTEST_RAD_S: f64 = 1.5;
 
 /// The bank's columns at a speed, rad/s.
-#[must_use]
 pub(crate) fn bank_columns<T: Real>(speed: T) -> [T; BANK] {
     let ratio = speed / T::from_double(4.0 * SLOWEST_RAD_S);
     let fastest = real::exp(-(ratio * ratio));
@@ -37,7 +36,6 @@ impl<T: Real> Combination<T> {
 }
 
 /// (S2): weights that give the column of `speed` (rad/s).
-#[must_use]
 pub fn combination<T: Real>(speed: T) -> Combination<T> {
     const COLUMNS: usize = BANK + 2;
     let half_root_pi = T::from_double(0.886_226_925_452_758);

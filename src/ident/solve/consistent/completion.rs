@@ -44,7 +44,6 @@ pub struct Effort<T> {
 
 impl<T: Real> Effort<T> {
     /// Settings for single precision. Without a prior the pull to a neutral leg only makes the answer unique.
-    #[must_use]
     pub fn device(with_prior: bool) -> Self {
         Self {
             pull: T::from_double(if with_prior { 1e-3 } else { 1e-4 }),
@@ -53,7 +52,6 @@ impl<T: Real> Effort<T> {
     }
 
     /// Settings for double precision, as a reference.
-    #[must_use]
     pub fn reference() -> Self {
         Self { pull: T::from_double(1e-5), last_barrier: T::from_double(1e-8) }
     }
@@ -86,7 +84,6 @@ pub struct Completion<T: Real, const N: usize> {
 
 impl<T: Real, const N: usize> Completion<T, N> {
     /// Prepares a completion; [`Self::start`] supplies the base values.
-    #[must_use]
     pub fn new<const B: usize>(
         model: &RowModel<T, N, B>,
         record: &Record<T, N, B>,
@@ -172,44 +169,37 @@ impl<T: Real, const N: usize> Completion<T, N> {
     }
 
     /// True once base values were given and the completion has ended.
-    #[must_use]
     pub(crate) fn is_done(&self) -> bool {
         self.phase == Phase::Done
     }
 
     /// True if the completion ended at the minimum, not for lack of steps or by overflow.
-    #[must_use]
     #[cfg(test)]
     pub(crate) fn converged(&self) -> bool {
         self.converged
     }
 
     /// True while base values are missing.
-    #[must_use]
     pub(crate) fn is_waiting(&self) -> bool {
         self.phase == Phase::Waiting
     }
 
     /// Newton steps so far; zero where the closed form is consistent.
-    #[must_use]
     pub fn steps(&self) -> u32 {
         self.steps
     }
 
     /// Current parameters; physically consistent at any time.
-    #[must_use]
     pub fn parameters(&self) -> LegParameters<T, N> {
         self.cost.parameters(&self.point)
     }
 
     /// Allowed set of the parameters.
-    #[must_use]
     pub fn limits(&self) -> &Limits<T, N> {
         &self.limits
     }
 
     /// The cost that is minimised.
-    #[must_use]
     #[cfg(test)]
     pub(crate) fn cost(&self) -> &LegCost<T, N> {
         &self.cost

@@ -38,7 +38,6 @@ pub struct LegCost<T: Real, const N: usize> {
 
 impl<T: Real, const N: usize> LegCost<T, N> {
     /// Cost without rows; prior and standard deviations come from `limits`.
-    #[must_use]
     pub fn new(limits: &Limits<T, N>) -> Self {
         let zero = zeros(T::zero());
         Self {
@@ -176,7 +175,6 @@ impl<T: Real, const N: usize> LegCost<T, N> {
     }
 
     /// `F` above its unconstrained minimum.
-    #[must_use]
     pub(crate) fn excess(&self, point: &LegParameters<T, N>) -> T {
         let point = point.as_flattened();
         let rows = self.triangle.as_flattened().iter().zip(self.right.as_flattened());
@@ -188,7 +186,6 @@ impl<T: Real, const N: usize> LegCost<T, N> {
     }
 
     /// Converts scaled coordinates to parameters.
-    #[must_use]
     pub fn parameters(&self, point: &LegParameters<T, N>) -> LegParameters<T, N> {
         let mut parameters = *point;
         multiply(&mut parameters, &self.scale);
@@ -197,7 +194,6 @@ impl<T: Real, const N: usize> LegCost<T, N> {
     }
 
     /// Converts parameters to scaled coordinates.
-    #[must_use]
     pub(crate) fn scaled_point(&self, parameters: &LegParameters<T, N>) -> LegParameters<T, N> {
         let mut point = *parameters;
         add_scaled(&mut point, &self.origin, -T::one());

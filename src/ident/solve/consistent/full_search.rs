@@ -42,7 +42,6 @@ pub struct FullObjective<'a, T: Real, const N: usize> {
 
 impl<'a, T: Real, const N: usize> FullObjective<'a, T, N> {
     /// Cost within the limits.
-    #[must_use]
     pub fn new(limits: &'a Limits<T, N>, cost: &'a LegCost<T, N>) -> Self {
         Self { limits, cost }
     }
@@ -59,7 +58,6 @@ impl<'a, T: Real, const N: usize> FullObjective<'a, T, N> {
     }
 
     /// Leg at a position: always physically consistent.
-    #[must_use]
     pub fn parameters(&self, position: &[T]) -> LegParameters<T, N> {
         let mut coordinates = *self.cost.origin();
         for ((joint, index), &value) in self.coordinates().zip(position) {
@@ -158,7 +156,6 @@ impl<T: Real, const D: usize> FullSearch<T, D> {
     }
 
     /// The best leg so far; `None` before the first evaluation.
-    #[must_use]
     pub fn parameters<const N: usize>(
         &self,
         objective: &FullObjective<'_, T, N>,
@@ -167,13 +164,11 @@ impl<T: Real, const D: usize> FullSearch<T, D> {
     }
 
     /// Completed iterations.
-    #[must_use]
     pub fn iterations(&self) -> u32 {
         self.swarm.iterations()
     }
 
     /// Evaluations so far.
-    #[must_use]
     pub fn evaluations(&self) -> u32 {
         self.swarm.evaluations()
     }

@@ -67,7 +67,6 @@ pub struct Limits<T: Real, const N: usize> {
 
 impl<T: Real, const N: usize> Limits<T, N> {
     /// Limits from `prior`, or from geometry and measured torque without one.
-    #[must_use]
     pub fn new<const B: usize>(
         model: &RowModel<T, N, B>,
         record: &Record<T, N, B>,
@@ -137,19 +136,16 @@ impl<T: Real, const N: usize> Limits<T, N> {
     }
 
     /// Prior, or a neutral leg without one; zero for parameters that are not estimated.
-    #[must_use]
     pub(crate) fn origin(&self) -> &LegParameters<T, N> {
         &self.origin
     }
 
     /// Standard deviations of [`Self::origin`].
-    #[must_use]
     pub(crate) fn deviations(&self) -> &LegParameters<T, N> {
         &self.deviations
     }
 
     /// A leg well inside: round bodies with the prior's masses, centres of mass and sizes.
-    #[must_use]
     pub(crate) fn inside(&self) -> LegParameters<T, N> {
         core::array::from_fn(|joint| {
             let link = &self.links[joint];
@@ -171,7 +167,6 @@ impl<T: Real, const N: usize> Limits<T, N> {
     }
 
     /// True if physically consistent: every link a possible body, no negative rotor inertia or friction.
-    #[must_use]
     pub fn consistent(parameters: &LegParameters<T, N>) -> bool {
         parameters.iter().all(|joint| {
             let never_negative = [Parameter::IA, Parameter::FC, Parameter::FV];
@@ -181,7 +176,6 @@ impl<T: Real, const N: usize> Limits<T, N> {
     }
 
     /// True if physically consistent and within the limits.
-    #[must_use]
     pub(crate) fn allow(&self, parameters: &LegParameters<T, N>) -> bool {
         Self::consistent(parameters)
             && self.links.iter().zip(parameters).all(|(link, joint)| {

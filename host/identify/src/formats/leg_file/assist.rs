@@ -23,7 +23,6 @@ impl AssistFile {
     pub const USUAL: Self = Self { friction: 1.0, inertia: 0.5, weight: 0.5, periodic: 0.3 };
 
     /// Shares for the firmware.
-    #[must_use]
     pub fn shares(&self) -> AssistShares {
         AssistShares {
             friction: self.friction as f32,

@@ -37,7 +37,6 @@ impl LegFile {
     }
 
     /// Replaces the noise by this standard deviation of each joint's logged torque, N m.
-    #[must_use]
     pub fn with_torque_noise(mut self, noise_nm: &[f64]) -> Self {
         self.torque_noise_percent = 0.0;
         for (joint, noise) in self.joints.iter_mut().zip(noise_nm) {
@@ -60,13 +59,11 @@ impl EncoderFile {
 
 impl JointFile {
     /// Limit of the drive's current, A.
-    #[must_use]
     pub fn current_limit(&self) -> f64 {
         self.current_limit_a.unwrap_or(self.torque_limit_nm / self.torque_per_ampere)
     }
 
     /// Lower of torque limit and current limit, N m.
-    #[must_use]
     pub fn torque_cap(&self) -> f64 {
         self.torque_limit_nm.min(self.current_limit() * self.torque_per_ampere)
     }
@@ -111,7 +108,6 @@ impl JointFile {
 
 impl PushesFile {
     /// Pushes as the plant takes them.
-    #[must_use]
     pub fn description(&self) -> PushDescription {
         PushDescription { rate: self.per_minute / 60.0, torque: self.torque_nm, duration: self.duration_s }
     }

@@ -50,7 +50,6 @@ pub struct DraftPrior {
 
 impl Draft {
     /// TOML text.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
         self.remarks.iter().for_each(|remark| comment(&mut text, remark));
@@ -129,7 +128,6 @@ impl DraftPrior {
 
 /// A prior as `truth`, an inline table. What a drive always has and the prior does not state is a word in
 /// capitals.
-#[must_use]
 pub fn truth_text(link: &LinkParameters) -> String {
     let LinkParameters { mass, com, inertia_com, rotor_inertia, coulomb, viscous, offset, asymmetry } = link;
     let or_word =

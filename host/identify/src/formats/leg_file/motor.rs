@@ -165,7 +165,6 @@ impl Default for SupplyFile {
 
 impl SupplyFile {
     /// Description of the simulated supply.
-    #[must_use]
     pub fn description(&self) -> SupplyDescription {
         SupplyDescription {
             voltage: self.voltage_v,
@@ -293,20 +292,17 @@ impl MotorFile {
     }
 
     /// Flux linkage of the magnets, V s.
-    #[must_use]
     pub(crate) fn flux(&self, joint: &JointFile) -> f64 {
         joint.torque_per_ampere / (1.5 * f64::from(self.pole_pairs) * joint.encoder.ratio)
     }
 
     /// Permitted travel of a calibration, motor turns.
-    #[must_use]
     pub fn calibration_turns(&self) -> f32 {
         let usual = drives::usual_travel_turns(self.pole_pairs as u8);
         self.calibration_turns.map_or(usual, |turns| turns as f32)
     }
 
     /// Motor, encoders and gear for the firmware.
-    #[must_use]
     pub fn for_firmware(&self, joint: &JointFile) -> scarab::leg::MotorDescription {
         scarab::leg::MotorDescription {
             pole_pairs: self.pole_pairs as u8,
@@ -327,7 +323,6 @@ impl MotorFile {
     }
 
     /// Thermal constants for the firmware.
-    #[must_use]
     pub fn winding(&self) -> WindingRating {
         WindingRating::new(
             Ohm(self.resistance_ohm as f32),
@@ -339,7 +334,6 @@ impl MotorFile {
     }
 
     /// Description of the simulated axis.
-    #[must_use]
     pub fn axis(&self, joint: &JointFile) -> AxisDescription {
         AxisDescription {
             motor: MotorDescription {
@@ -414,7 +408,6 @@ impl ThermistorFile {
     }
 
     /// Constants for the firmware.
-    #[must_use]
     pub fn for_firmware(&self) -> Thermistor {
         Thermistor {
             pull_up: Ohm(self.pull_up_ohm as f32),
@@ -426,7 +419,6 @@ impl ThermistorFile {
 
 impl LegFile {
     /// The leg with a thermistor of 10 kOhm in each winding.
-    #[must_use]
     pub fn with_thermistors(&self) -> Self {
         let mut leg = self.clone();
         for motor in leg.joints.iter_mut().filter_map(|joint| joint.motor.as_mut()) {
@@ -437,7 +429,6 @@ impl LegFile {
     }
 
     /// The leg with an AS5047P at each rotor and each joint, at the distal joints against their counters.
-    #[must_use]
     pub fn with_absolute_encoders(&self) -> Self {
         let mut leg = self.clone();
         for (index, joint) in leg.joints.iter_mut().enumerate() {
@@ -469,7 +460,6 @@ impl LegFile {
     }
 
     /// Delays of the holding brake for the firmware, rounded up.
-    #[must_use]
     pub fn brake_delays(&self) -> Option<BrakeDelays> {
         let brake = self.brake?;
         let (release_ms, engage_ms) = (brake.release_ms.ceil() as u16, brake.engage_ms.ceil() as u16);
@@ -477,7 +467,6 @@ impl LegFile {
     }
 
     /// Limits of the supply for the firmware.
-    #[must_use]
     pub fn supply_limits(&self) -> SupplyLimits {
         let limit = |ampere: Option<f64>| ampere.map(|ampere| Ampere(ampere as f32));
         SupplyLimits {

@@ -21,7 +21,6 @@ pub struct SegmentsFile {
 
 impl SegmentsFile {
     /// Wearer of this mass (kg) with these segments and this length of the thigh (m).
-    #[must_use]
     pub fn wearer(&self, thigh: f64, mass: f64) -> Wearer {
         Wearer { mass, thigh, shank: self.shank_m, foot: self.foot_m }
     }
@@ -40,7 +39,6 @@ pub enum BodySide {
 
 impl BodySide {
     /// Sign of motors and encoders relative to the anatomical direction.
-    #[must_use]
     pub fn mounting(self) -> f64 {
         match self {
             Self::Right => 1.0,
@@ -55,7 +53,6 @@ const SHORTEST_LINK_M: f64 = 0.05;
 impl LegFile {
     /// Length of the link beyond a joint, m, up to the next joint's axis. The last link has the
     /// shank's length if stated, else twice the distance of its centre of mass, if known.
-    #[must_use]
     pub(crate) fn link_length(&self, joint: usize) -> f64 {
         if let Some(next) = self.joints.get(joint + 1) {
             return next.dh.a.hypot(next.dh.d);

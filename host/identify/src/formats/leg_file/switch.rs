@@ -16,7 +16,6 @@ pub enum Switch {
 
 impl Switch {
     /// Word in leg files and reports.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Auto => "auto",

@@ -14,7 +14,6 @@ const HEAD: &str = "\
 
 impl ModelFile {
     /// TOML text that [`ModelFile::parse`] reads back unchanged.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         let mut out = String::from(HEAD);
         line(&mut out, "schema", &self.schema);

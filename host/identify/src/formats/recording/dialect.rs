@@ -23,7 +23,6 @@ pub enum Delimiter {
 impl Delimiter {
     const ALL: [Self; 3] = [Self::Comma, Self::Semicolon, Self::Tab];
 
-    #[must_use]
     pub(crate) fn byte(self) -> u8 {
         match self {
             Self::Comma => b',',
@@ -33,7 +32,6 @@ impl Delimiter {
     }
 
     /// Word of the option `--delimiter`.
-    #[must_use]
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Comma => "comma",
@@ -52,7 +50,6 @@ pub enum Decimal {
 
 impl Decimal {
     /// Number written with this sign, NaN and infinity included.
-    #[must_use]
     pub fn parse(self, text: &str) -> Option<f64> {
         match self {
             Self::Point => text.parse().ok(),
@@ -96,7 +93,6 @@ impl Dialect {
     }
 
     /// Description for the report.
-    #[must_use]
     pub fn words(self) -> String {
         let delimiter = match self.delimiter {
             Delimiter::Comma => "commas",

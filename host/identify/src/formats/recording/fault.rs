@@ -214,7 +214,6 @@ pub(crate) enum Fault {
 
 impl Fault {
     /// Whether the fault is one row's, so that the row can be skipped.
-    #[must_use]
     pub(crate) fn is_of_row(&self) -> bool {
         matches!(
             self,
@@ -227,7 +226,6 @@ impl Fault {
     }
 
     /// Whether the fault is the unit of all rows.
-    #[must_use]
     pub(crate) fn is_of_unit(&self) -> bool {
         matches!(self, Self::Absurd { advice, .. } if !advice.is_empty())
     }

@@ -108,7 +108,6 @@ pub struct Import {
 
 impl Import {
     /// Documented format with this number of joints.
-    #[must_use]
     pub fn plain(joints: usize) -> Self {
         let drive =
             |joint: usize| Drive { joint: joint.to_string(), torque_per_ampere: None, motor_ratio: None };
@@ -117,7 +116,6 @@ impl Import {
     }
 
     /// Documented format for a leg whose file holds this text.
-    #[must_use]
     pub fn from_leg(leg: &LegFile, text: &str) -> Self {
         let states_constant = LegFile::joints_that_state(text, "torque_per_ampere");
         let states_encoder = LegFile::joints_that_state(text, "encoder");
@@ -186,7 +184,6 @@ impl Import {
     }
 
     /// Unit in use, and whether the user stated it.
-    #[must_use]
     pub fn unit(&self, signal: Signal) -> (Unit, bool) {
         let quantity = signal.quantity();
         let by_quantity = || self.by_quantity.iter().find(|unit| unit.quantity == quantity);

@@ -25,7 +25,6 @@ impl Quantity {
     pub(crate) const ALL: [Self; 4] = [Self::Time, Self::Angle, Self::Torque, Self::Current];
 
     /// SI unit, which is the default.
-    #[must_use]
     pub(crate) fn si(self) -> Unit {
         match self {
             Self::Time => UNITS[0],
@@ -96,13 +95,11 @@ const SPELLINGS: [(&str, &str); 23] = [
 
 impl Unit {
     /// Value in the SI unit.
-    #[must_use]
     pub(crate) fn to_si(self, value: f64) -> f64 {
         value * self.times / self.over
     }
 
     /// SI value of one unit.
-    #[must_use]
     pub(crate) fn factor(&self) -> f64 {
         self.times / self.over
     }
@@ -113,13 +110,11 @@ impl Unit {
     }
 
     /// Unit of this name on the command line.
-    #[must_use]
     pub(crate) fn named(name: &str) -> Option<Self> {
         UNITS.into_iter().find(|unit| unit.name == name)
     }
 
     /// Unit that a word of a column's name states, in any case and spelling.
-    #[must_use]
     pub(crate) fn spelt(word: &str) -> Option<Self> {
         let lower = word.to_lowercase();
         let name =
@@ -128,7 +123,6 @@ impl Unit {
     }
 
     /// Names of all units, for messages.
-    #[must_use]
     pub(crate) fn names() -> String {
         UNITS.map(|unit| unit.name).join(", ")
     }
@@ -145,7 +139,6 @@ pub enum Signal {
 }
 
 impl Signal {
-    #[must_use]
     pub(crate) fn quantity(self) -> Quantity {
         match self {
             Self::Time => Quantity::Time,
@@ -156,7 +149,6 @@ impl Signal {
     }
 
     /// Joint, from 1; none for the time.
-    #[must_use]
     pub fn joint(self) -> Option<usize> {
         match self {
             Self::Time => None,
@@ -167,7 +159,6 @@ impl Signal {
     }
 
     /// Name of its column in a file that follows the documented names.
-    #[must_use]
     pub(crate) fn column(self, unit: Unit) -> String {
         format!("{self}_{}", unit.name)
     }

@@ -64,7 +64,6 @@ struct Tried {
 }
 
 /// Names the most likely cause of a refusal.
-#[must_use]
 pub(crate) fn likely<const N: usize, const B: usize>(
     question: &Question<N, B>,
     errors: Option<&LoggingErrors<N, B>>,
@@ -176,7 +175,6 @@ fn encoder_steps<const N: usize, const B: usize>(
 
 /// A joint, or all, whose angle is in degrees. It spans more than two turns; read as degrees it leaves less
 /// than half of the misfit and a plausible leg.
-#[must_use]
 pub(crate) fn in_degrees<const N: usize, const B: usize>(
     question: &Question<N, B>,
     errors: &LoggingErrors<N, B>,
@@ -306,7 +304,6 @@ fn changed_midway(midway: &Midway, here: Quality) -> Tried {
 }
 
 /// Equations with all angles in one other unit, for each unit that is possible.
-#[must_use]
 pub(crate) fn with_other_angles<const N: usize, const B: usize>(
     question: &Question<N, B>,
 ) -> Vec<(ReadAs, Equations<N, B>)> {

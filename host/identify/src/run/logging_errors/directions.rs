@@ -71,7 +71,6 @@ pub enum Kind {
 
 impl Kind {
     /// All directions of a leg.
-    #[must_use]
     pub(crate) fn all(joints: usize) -> Vec<Self> {
         let delays = (0..joints).map(Self::Delay);
         let scales = (0..joints).map(Self::EncoderScale);
@@ -79,7 +78,6 @@ impl Kind {
     }
 
     /// Name in reports.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Delay(_) => "delay",
@@ -90,7 +88,6 @@ impl Kind {
     }
 
     /// Joint, from 0.
-    #[must_use]
     pub fn joint(self) -> Option<usize> {
         match self {
             Self::Delay(joint) | Self::EncoderScale(joint) | Self::TorqueScale(joint) => Some(joint),
@@ -99,7 +96,6 @@ impl Kind {
     }
 
     /// Unit of reports and the factor to it.
-    #[must_use]
     pub fn unit(self) -> (&'static str, f64) {
         match self {
             Self::Delay(_) => ("ms", 1e3),
@@ -153,26 +149,22 @@ pub(crate) struct Found<const B: usize> {
 
 impl<const B: usize> Found<B> {
     /// The larger standard deviation.
-    #[must_use]
     pub(crate) fn sigma(&self) -> f64 {
         self.noise_sigma.max(self.segment_sigma)
     }
 
     /// Value over its standard deviation.
-    #[must_use]
     pub(crate) fn significance(&self) -> f64 {
         if self.seen { self.value.abs() / self.sigma() } else { 0.0 }
     }
 
     /// Share of the misfit that the direction explains.
-    #[must_use]
     pub(crate) fn explained(&self) -> f64 {
         if self.seen { ((self.cost.0 - self.cost.1) / self.cost.0).max(0.0) } else { 0.0 }
     }
 
     /// Variance that a possible error adds to each parameter: the shift, reduced by the part that chance
     /// explains.
-    #[must_use]
     pub(crate) fn variance(&self) -> [f64; B] {
         let certain = (1.0 - (2.0 / self.significance().max(1e-9)).powi(2)).max(0.0);
         self.shift.map(|shift| shift * shift * certain)
@@ -193,7 +185,6 @@ type System<'a, const B: usize> = (Cow<'a, [[f64; B]]>, Cow<'a, [f64]>);
 
 impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     /// Fits every direction and lists those that cannot be distinguished from it.
-    #[must_use]
     pub(crate) fn all(&self) -> Vec<Found<B>> {
         let plain = self.equations.fit(&self.equations.columns, &self.equations.torque, false);
         let training = self.equations.fit(&self.equations.columns, &self.equations.torque, true);
@@ -217,7 +208,6 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     }
 
     /// Columns and torques with a direction at `value`.
-    #[must_use]
     pub(crate) fn system(&self, kind: Kind, value: f64) -> System<'a, B> {
         let all = self.equations;
         let plain = Cow::Borrowed(all.torque.as_slice());
@@ -241,7 +231,6 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     }
 
     /// Columns with the angle of a joint multiplied about its zero.
-    #[must_use]
     pub(crate) fn scaled(&self, joint: usize, factor: f64) -> Vec<[f64; B]> {
         let zero = self.zero[joint];
         let change = |instant: &mut Smoothed<f64, N>| {
@@ -377,7 +366,6 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
 }
 
 /// Name and joint in words.
-#[must_use]
 pub fn label(kind: Kind) -> String {
     match kind.joint() {
         Some(joint) => format!("{} of joint {}", kind.name(), joint + 1),

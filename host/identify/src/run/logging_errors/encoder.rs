@@ -67,7 +67,6 @@ pub(crate) struct Encoder {
 impl Encoder {
     /// Encoder of a column of angles; `None` for a continuous one. `described_rad` is the step by the leg
     /// file, which distinguishes a mean of readings from finer counts.
-    #[must_use]
     pub(crate) fn detect(angle: &[f64], described_rad: f64) -> Option<Self> {
         let mut changes: Vec<f64> =
             angle.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|&change| change > 1e-12).collect();
@@ -118,25 +117,21 @@ pub(crate) struct Bias<const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> Bias<N, B> {
     /// Joint with the largest torque error, and that error as a share.
-    #[must_use]
     pub(crate) fn largest_share(&self) -> (usize, f64) {
         largest(&self.torque_share)
     }
 
     /// Joint whose columns are noisiest, and their noise.
-    #[must_use]
     pub(crate) fn largest_noise(&self) -> (usize, f64) {
         largest(&self.column_noise)
     }
 
     /// Whether the bias is too large for the second reading to show it.
-    #[must_use]
     pub(crate) fn is_beyond(&self) -> bool {
         self.largest_noise().1 > LARGEST_NOISE
     }
 
     /// Whether the bias refuses the recording.
-    #[must_use]
     pub(crate) fn refuses(&self) -> bool {
         self.is_beyond() || self.largest_share().1 > LARGEST_SHARE
     }

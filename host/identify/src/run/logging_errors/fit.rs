@@ -30,13 +30,11 @@ pub(crate) struct Fit<const B: usize> {
 
 impl<const B: usize> Fit<B> {
     /// Torque minus prediction of every equation.
-    #[must_use]
     pub(crate) fn residuals(&self, columns: &[[f64; B]], torque: &[f64]) -> Vec<f64> {
         columns.iter().zip(torque).map(|(row, torque)| torque - dot(row, &self.values)).collect()
     }
 
     /// Predicted torque of every equation.
-    #[must_use]
     pub(crate) fn predictions(&self, columns: &[[f64; B]]) -> Vec<f64> {
         columns.iter().map(|row| dot(row, &self.values)).collect()
     }
@@ -96,7 +94,6 @@ fn apply<const B: usize>(matrix: &[[f64; B]; B], vector: &[f64; B]) -> [f64; B] 
 }
 
 /// Solves in closed form.
-#[must_use]
 pub(crate) fn solve<const B: usize>(
     columns: &[[f64; B]],
     torque: &[f64],
@@ -143,14 +140,12 @@ pub(crate) struct Score {
 
 impl Score {
     /// The larger standard deviation.
-    #[must_use]
     pub(crate) fn sigma(&self) -> f64 {
         self.noise_sigma.max(self.segment_sigma)
     }
 }
 
 /// Estimates column `z` beside the parameters of `fit`. `segment` is the segment of each equation.
-#[must_use]
 pub(crate) fn score<const B: usize>(
     fit: &Fit<B>,
     columns: &[[f64; B]],
@@ -212,7 +207,6 @@ fn small_sample(sums: &[f64]) -> f64 {
 }
 
 /// Standard deviations of the parameters by the scatter of the segments.
-#[must_use]
 pub(crate) fn segment_sigma<const B: usize>(
     fit: &Fit<B>,
     columns: &[[f64; B]],

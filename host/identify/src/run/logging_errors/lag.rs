@@ -56,7 +56,6 @@ pub(crate) struct Lag<const B: usize> {
 }
 
 /// Delay of all torques, then the low-pass of all and of each joint where it fits better than a delay.
-#[must_use]
 pub(crate) fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Vec<Lag<B>> {
     let search = Search { equations, every_row: equations.every_row() };
     let mut found = Vec::new();

@@ -42,13 +42,11 @@ pub(crate) struct Midway {
 
 impl Midway {
     /// Whether the change refuses the recording.
-    #[must_use]
     pub(crate) fn refuses(&self) -> bool {
         self.change.abs() > self.limit()
     }
 
     /// Limit of the change.
-    #[must_use]
     pub(crate) fn limit(&self) -> f64 {
         LARGEST_CHANGE + CHANCE * self.sigma
     }
@@ -100,7 +98,6 @@ fn change<const B: usize>(plain: &Fit<B>, whole: &Sums<B>, after: &Sums<B>) -> (
 ///
 /// Searches once with the robust weights, which ignore a push, and once with every row: after a change of
 /// sign, robust weights exclude the rows after it.
-#[must_use]
 pub(crate) fn find<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
     let robust = strongest(all);
     let whole = strongest(&all.with_equal_weights())

@@ -75,13 +75,11 @@ pub(crate) struct Question<const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> Question<N, B> {
     /// Chain angles of the joints' zeros, rad.
-    #[must_use]
     pub(crate) fn zero(&self) -> [f64; N] {
         self.anatomy.map(|joint| joint.zero_offset())
     }
 
     /// This input with every column and without Stribeck friction; `None` if nothing changes.
-    #[must_use]
     pub(crate) fn with_all_columns(&self) -> Option<Self> {
         let active = core::array::from_fn(|base| base < self.model.base.rank());
         let is_plain = self.model.stribeck.iter().all(|curve| curve.excess == 0.0);
@@ -173,19 +171,16 @@ pub(crate) struct Sigma {
 
 impl Sigma {
     /// Part caused by unmodelled effects.
-    #[must_use]
     pub(crate) fn misfit(&self) -> f64 {
         self.segments.max(self.recordings)
     }
 
     /// Reported value.
-    #[must_use]
     pub fn total(&self) -> f64 {
         self.noise.max(self.misfit()).hypot(self.logging).hypot(self.encoder)
     }
 
     /// Largest part.
-    #[must_use]
     pub(crate) fn source(&self) -> &'static str {
         let scatter = self.noise.max(self.misfit());
         if self.logging.max(self.encoder) > scatter {
@@ -240,7 +235,6 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
     }
 
     /// Findings for the verdict.
-    #[must_use]
     pub fn findings(&self) -> Vec<FindingReport> {
         let mut findings: Vec<FindingReport> = self.directions.iter().map(DirectionReport::finding).collect();
         findings.extend(self.encoder.as_ref().map(|bias| {
@@ -286,7 +280,6 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
     }
 
     /// Report without a cause.
-    #[must_use]
     pub(crate) fn report(&self) -> DoubtReport {
         DoubtReport {
             directions: self.directions.clone(),
@@ -297,7 +290,6 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
 }
 
 /// Finding about samples, for the verdict.
-#[must_use]
 pub(crate) fn sample_finding(finding: &SampleFinding) -> FindingReport {
     let failure = finding.refuses.then(|| format!("{}: {}", finding.file, finding.text));
     let values = [finding.value.into(), Number::UNKNOWN];
@@ -305,7 +297,6 @@ pub(crate) fn sample_finding(finding: &SampleFinding) -> FindingReport {
 }
 
 /// Finding about samples, as the likely cause.
-#[must_use]
 pub(crate) fn sample_cause(finding: &SampleFinding) -> CauseReport {
     CauseReport {
         name: finding.name,
@@ -318,7 +309,6 @@ pub(crate) fn sample_cause(finding: &SampleFinding) -> CauseReport {
 }
 
 /// Message about a change midway.
-#[must_use]
 pub(crate) fn midway_words(midway: &Midway) -> String {
     let joints = joint_words(midway.joint);
     let what = if midway.change < -1.0 {

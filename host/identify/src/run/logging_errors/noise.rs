@@ -20,7 +20,6 @@ const NORMAL_MEDIAN: f64 = 0.674_490;
 const FEWEST: usize = 20;
 
 /// Scatter of one file's torque in units of sqrt(density), one number for each difference.
-#[must_use]
 pub(crate) fn scatter(time_s: &[f64], torque: &[f64], bandwidth_hz: f64) -> Vec<f64> {
     let samples = time_s.len().min(torque.len());
     if samples < 8 {
@@ -45,7 +44,6 @@ pub(crate) fn scatter(time_s: &[f64], torque: &[f64], bandwidth_hz: f64) -> Vec<
 }
 
 /// Density of the noise, (N m)^2 s, from the scatter of all files; `None` with too few differences.
-#[must_use]
 pub(crate) fn density(scatter: Vec<f64>) -> Option<f64> {
     (scatter.len() >= FEWEST).then(|| (quantile(scatter, 0.5) / NORMAL_MEDIAN).powi(2))
 }

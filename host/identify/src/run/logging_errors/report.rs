@@ -10,7 +10,6 @@ use crate::run::logging_errors::directions::{
 impl DirectionReport {
     /// Judges a direction. `sigma` is that of the parameters, `systematic` the part of the misfit that is not
     /// noise.
-    #[must_use]
     pub fn new<const B: usize>(found: &Found<B>, sigma: &[f64; B], systematic: f64) -> Self {
         let (unit, factor) = found.kind.unit();
         let shifts = found.shift.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
@@ -38,7 +37,6 @@ impl DirectionReport {
 
 impl CauseReport {
     /// A direction as the likely cause.
-    #[must_use]
     pub(crate) fn direction(kind: Kind, direction: &DirectionReport) -> Self {
         Self {
             name: kind.name(),

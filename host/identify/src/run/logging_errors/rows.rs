@@ -195,7 +195,6 @@ pub(crate) struct Equations<const N: usize, const B: usize> {
 
 impl<const N: usize, const B: usize> Equations<N, B> {
     /// Filters the motions; `None` if a joint has too few rows.
-    #[must_use]
     pub fn new(
         model: &RowModel<f64, N, B>,
         motions: &[Motion<N>],
@@ -229,19 +228,16 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     /// Largest delay that can be tried, s.
-    #[must_use]
     pub(crate) fn largest_delay_s(&self) -> f64 {
         (self.filters.smoothing.reach() as f64 - 3.0) / SAMPLE_RATE_HZ
     }
 
     /// Information of one row in independent rows.
-    #[must_use]
     pub fn information(&self) -> f64 {
         DECIMATION as f64 * self.energy()
     }
 
     /// Share of a 500 Hz sample's noise variance that the low-pass leaves.
-    #[must_use]
     pub(crate) fn energy(&self) -> f64 {
         self.filters.low_pass.energy()
     }
@@ -309,31 +305,26 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     /// Standard deviations of the parameters of a fit to the training motion, by the scatter of its segments.
-    #[must_use]
     pub(crate) fn scatter(&self, fit: &Fit<B>) -> [f64; B] {
         segment_sigma(fit, &self.columns, &self.torque, &self.training_weight(), &self.clusters())
     }
 
     /// Cluster of each equation.
-    #[must_use]
     pub(crate) fn clusters(&self) -> Vec<usize> {
         self.sources.iter().map(|source| source.cluster).collect()
     }
 
     /// Estimates column `z` beside the parameters of `fit`, which are those of these columns and torques.
-    #[must_use]
     pub(crate) fn score(&self, fit: &Fit<B>, columns: &[[f64; B]], torque: &[f64], z: &[f64]) -> Score {
         score(fit, columns, torque, z, &self.weight, &self.clusters())
     }
 
     /// Unchanged row model.
-    #[must_use]
     pub(crate) fn model(&self) -> &RowModel<f64, N, B> {
         &self.model
     }
 
     /// Torque of all equations; that of `joint`, or of all joints, taken `late_s` after the angle.
-    #[must_use]
     pub(crate) fn delayed(&self, joint: Option<usize>, late_s: f64) -> Vec<f64> {
         let pairs = self.sources.iter().zip(&self.torque);
         pairs
@@ -348,7 +339,6 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     /// Columns of every row of every recording, including rows without an equation.
-    #[must_use]
     pub(crate) fn every_row(&self) -> Vec<Vec<[[f64; B]; N]>> {
         let rows = self.parts.iter().map(|part| part.rows(&self.filters, &self.model, &|_| {}));
         rows.map(|rows| rows.into_iter().map(|row| row.regressor).collect()).collect()
@@ -356,7 +346,6 @@ impl<const N: usize, const B: usize> Equations<N, B> {
 
     /// Columns of all equations; those of `joint`, or of all joints, behind a first-order low-pass of this
     /// time constant. Exact where the columns of `every_row` are straight between two rows.
-    #[must_use]
     pub(crate) fn low_passed(
         &self,
         every_row: &[Vec<[[f64; B]; N]>],
@@ -385,7 +374,6 @@ impl<const N: usize, const B: usize> Equations<N, B> {
 
     /// Rate of change of a series given at the equations, within each joint and motion; zero at gaps and
     /// ends.
-    #[must_use]
     pub(crate) fn rate_of(&self, series: &[f64]) -> Vec<f64> {
         let step = DECIMATION as f64 / SAMPLE_RATE_HZ;
         let mut slots: Vec<[usize; N]> = Vec::new();
@@ -416,7 +404,6 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     /// Least squares with these columns and torques, all equations or those of the training motion.
-    #[must_use]
     pub(crate) fn fit(&self, columns: &[[f64; B]], torque: &[f64], training_only: bool) -> Fit<B> {
         if !training_only {
             return solve(columns, torque, &self.weight, &self.active);
@@ -425,14 +412,12 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     /// Copy in which every equation has the weight of its joint.
-    #[must_use]
     pub(crate) fn with_equal_weights(&self) -> Self {
         let weight = self.sources.iter().map(|source| 1.0 / self.row_sigma[source.joint]).collect();
         Self { weight, ..self.clone() }
     }
 
     /// Weights of the equations of the training motion; zero for the others.
-    #[must_use]
     pub(crate) fn training_weight(&self) -> Vec<f64> {
         let pairs = self.weight.iter().zip(&self.sources);
         pairs.map(|(&weight, source)| if source.training { weight } else { 0.0 }).collect()

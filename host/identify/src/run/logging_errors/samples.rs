@@ -83,7 +83,6 @@ pub(crate) struct Screened {
 /// Examines recordings of one machine. Limits of the torque are searched in each recording alone and in all
 /// together. `described_rad` are the steps of the encoders by the leg file. `reach_s` is the time lost on
 /// either side of an excluded stretch.
-#[must_use]
 pub(crate) fn screen(recordings: &[&Recording], described_rad: &[f64], reach_s: f64) -> Vec<Screened> {
     let mut examinations: Vec<Examination> =
         recordings.iter().map(|recording| Examination::new(recording, described_rad)).collect();

@@ -44,7 +44,6 @@ const PIECE_S: f64 = 0.5;
 const SPEED_S: f64 = 0.03;
 
 /// Examines the time stamps of a recording for rows with this bandwidth.
-#[must_use]
 pub(crate) fn examine(recording: &Recording, bandwidth_hz: f64) -> Option<SampleFinding> {
     let time = &recording.time_s;
     let median_step = recording.median_step_s();

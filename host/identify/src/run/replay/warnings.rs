@@ -7,7 +7,6 @@ use crate::formats::recording::Recording;
 const RANGE_MARGIN_DEG: f64 = 5.0;
 
 /// Joints of the file that the leg does not have.
-#[must_use]
 pub fn of_more_joints(recording: &Recording, leg: &LegFile) -> Option<String> {
     let (in_file, in_leg) = (recording.joints_in_file, leg.joints.len());
     (in_file > in_leg).then(|| {

@@ -78,7 +78,6 @@ pub fn identified(leg: &LegFile, seed: u64) -> Result<ModelRecord<JOINTS>, ToolE
 }
 
 /// The model as that of the worn leg.
-#[must_use]
 pub fn worn(model: &ModelRecord<JOINTS>) -> ModelRecord<JOINTS> {
     let mut worn = *model;
     worn.provenance.worn = Some(true);
@@ -326,7 +325,6 @@ fn corruption(fault: &Fault, stored: &FilledBoard, seed: u64, blind: bool) -> Re
 }
 
 /// Following window among a node's objects, or its start value.
-#[must_use]
 pub fn window(bytes: &[u8]) -> u32 {
     stored_entries(bytes).find(|(object, _)| object.index == WINDOW).map_or(UNTOUCHED, |(_, value)| value)
 }

@@ -308,7 +308,6 @@ impl HostSession {
     }
 
     /// Removes the steps without which the session still fails, within a number of runs.
-    #[must_use]
     pub fn reduced(mut self, most_runs: u32, mut fails: impl FnMut(&Self) -> bool) -> Self {
         let (mut length, mut runs) = (self.steps.len().div_ceil(2), 0);
         while length > 0 {

@@ -412,7 +412,6 @@ pub fn check_session<L: HostedLeg>(
 }
 
 /// Whether two complaints are of the same kind.
-#[must_use]
 pub fn is_like(why: &str, other: &str) -> bool {
     why.split(':').next() == other.split(':').next()
 }

@@ -97,7 +97,6 @@ pub fn check(command: &Command, matches: &ArgMatches) -> Result<(), ToolError> {
 }
 
 /// Whether the type of an argument defines the use of its file.
-#[must_use]
 pub(crate) fn has_role(argument: &Arg) -> bool {
     let kind = argument.get_value_parser().type_id();
     [

@@ -57,7 +57,6 @@ pub struct LegName(String);
 
 impl LegName {
     /// File, unless a shipped leg is meant.
-    #[must_use]
     pub(crate) fn file(&self) -> Option<&Path> {
         let is_shipped = SHIPPED_LEGS.iter().any(|(name, _)| *name == self.0);
         (!is_shipped).then(|| Path::new(&self.0))

@@ -17,7 +17,6 @@ use crate::cli::arguments::role::{Input, LegName, Output, OutputFolder, Updated}
 const SHARD: &str = "shard";
 
 /// Stated arguments of a campaign, in the order of its help; none of a command that cannot be divided.
-#[must_use]
 pub(crate) fn stated(command: &Command, matches: &ArgMatches) -> Vec<Argument> {
     let (mut command, mut matches) = (command, matches);
     while let Some((name, inner)) = matches.subcommand() {

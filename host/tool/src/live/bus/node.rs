@@ -51,7 +51,6 @@ impl NmtState {
     }
 
     /// State as the end of a sentence.
-    #[must_use]
     pub(crate) const fn words(self) -> &'static str {
         match self {
             Self::BootUp => "has started",
@@ -112,25 +111,21 @@ fn number(bytes: &[u8]) -> u32 {
 
 impl Node {
     /// A node of this ID, of which nothing is known.
-    #[must_use]
     pub fn new(id: u8) -> Self {
         Self { id, ..Self::default() }
     }
 
     /// Node-ID.
-    #[must_use]
     pub(crate) fn id(&self) -> u8 {
         self.id
     }
 
     /// Time of the node's last own frame, s.
-    #[must_use]
     pub(crate) fn heard_s(&self) -> Option<f64> {
         self.heard_s
     }
 
     /// COB-ID of its emergency messages.
-    #[must_use]
     pub(crate) fn emergency(&self) -> u16 {
         (self.parameter(0x1014, 0) & 0x7FF) as u16
     }
@@ -140,20 +135,17 @@ impl Node {
     }
 
     /// Raw value of an object, if known.
-    #[must_use]
     pub(crate) fn raw(&self, index: u16, sub: u8) -> Option<u32> {
         self.known(index, sub).map(|known| known.raw)
     }
 
     /// The object among these that was seen last.
-    #[must_use]
     pub(crate) fn newest(&self, indices: &[u16]) -> Option<u16> {
         let seen = indices.iter().filter_map(|index| Some((*index, self.time_s(*index, 0)?)));
         seen.max_by(|one, other| one.1.total_cmp(&other.1)).map(|(index, _)| index)
     }
 
     /// Value of a signed object, if known.
-    #[must_use]
     pub(crate) fn signed(&self, index: u16) -> Option<i32> {
         let known = self.known(index, 0)?;
         let unused = 32 - 8 * known.bytes.clamp(1, 4) as u32;
@@ -161,13 +153,11 @@ impl Node {
     }
 
     /// Value of a REAL32 object, if known and a number.
-    #[must_use]
     pub(crate) fn real(&self, index: u16, sub: u8) -> Option<f32> {
         self.raw(index, sub).map(f32::from_bits).filter(|value| value.is_finite())
     }
 
     /// Time at which a value was last seen, s.
-    #[must_use]
     pub(crate) fn time_s(&self, index: u16, sub: u8) -> Option<f64> {
         self.known(index, sub).map(|known| known.at_s)
     }

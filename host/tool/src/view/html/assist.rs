@@ -30,7 +30,6 @@ fn section(title: &str, words: &str, shown: &Markup) -> Markup {
 }
 
 /// Creates the page.
-#[must_use]
 pub(crate) fn page(circumstances: &Circumstances, report: &AssistReport, figures: &[Figure]) -> String {
     let failures = report.failures();
     let is_good = failures.is_empty();

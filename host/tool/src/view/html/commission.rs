@@ -56,7 +56,6 @@ fn joints(report: &CommissionReport) -> Table {
 }
 
 /// Creates the page, with the present time.
-#[must_use]
 pub(crate) fn page(report: &CommissionReport) -> String {
     let verdict = match (report.verdict, report.stored) {
         (Some("accepted"), true) => "accepted and stored",

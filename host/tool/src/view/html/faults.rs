@@ -23,7 +23,6 @@ pub(crate) struct Campaign<'a> {
 }
 
 /// Creates the page.
-#[must_use]
 pub(crate) fn page(circumstances: &Circumstances, campaign: &Campaign<'_>) -> String {
     let verdict = campaign.verdict;
     let page = html! {

@@ -46,7 +46,6 @@ pub(crate) fn all(run: &RunReport, leg: &LegFile) -> Markup {
 }
 
 /// What splits a measured sum of parameters.
-#[must_use]
 pub(crate) const fn split(has_prior: bool) -> &'static str {
     if has_prior { "the prior splits them" } else { "without a prior nothing splits them" }
 }

@@ -30,7 +30,6 @@ impl ToHtml for Table {
 }
 
 /// Cell that only a page shows.
-#[must_use]
 pub(crate) fn html_cell(markup: Markup) -> Cell {
     Cell::Html(String::new(), markup.into_string())
 }

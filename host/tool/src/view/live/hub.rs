@@ -101,7 +101,6 @@ pub(crate) struct Cursor {
 
 impl Cursor {
     /// Position behind this point, for a page that returns.
-    #[must_use]
     pub(crate) fn behind(point: u64) -> Self {
         Self { point, version: 0, started: true }
     }
@@ -218,7 +217,6 @@ impl Hub {
     }
 
     /// Next message for a page, and its new position; `None` without news, and before the scene.
-    #[must_use]
     pub(crate) fn read(&self, cursor: Cursor) -> Option<(Message, Cursor)> {
         let state = self.lock();
         state.scene.as_ref()?;

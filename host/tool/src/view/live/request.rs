@@ -54,7 +54,6 @@ pub(crate) enum Answer {
 
 impl Access {
     /// Decides about a request.
-    #[must_use]
     pub(crate) fn answer(&self, method: &Method, uri: &Uri, headers: &HeaderMap) -> Answer {
         if method != Method::GET {
             return Answer::Refused(

@@ -109,7 +109,6 @@ impl Server {
     }
 
     /// Address of the page, to be opened in a browser.
-    #[must_use]
     pub(crate) fn url(&self) -> String {
         let Access { address, token } = &self.access;
         // A wildcard address is no destination.
