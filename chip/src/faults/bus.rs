@@ -69,8 +69,22 @@ fn release(session: &Session) -> Result<Option<Ticks>, String> {
     if reaction.on_again { Err("a bridge was on again".into()) } else { Ok(reaction.released) }
 }
 
-/// B1: heartbeat, targets or both end. The leg is damped in time after the host's timeout, then off; the
-/// bus says why, and the host's return does not enable.
+/// Instant of the last SYNC that made targets valid, of frames in their order.
+fn last_valid(heard: &[(Ticks, Frame)]) -> Ticks {
+    let mut wait = false;
+    heard.iter().fold(0, |last, (at, frame)| match frame.id() {
+        TARGETS => {
+            wait = true;
+            last
+        }
+        SYNC if core::mem::take(&mut wait) => *at,
+        _ => last,
+    })
+}
+
+/// B1: heartbeat, targets or both end; targets end with their SYNC, or one of the two goes on without effect.
+/// The leg is damped in time after the host's timeout, then off; the bus says why, and the host's return does
+/// not enable.
 pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError> {
     let hosted = machines.hosted()?;
     let mut random = Random::new("B1", seed);
@@ -80,6 +94,7 @@ pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError
     let silent = [[true, false], [false, true], [true, true]][seed as usize % 3];
     // Fault, or quick stop.
     let option = if random.coin() { 1 } else { 3 };
+    let goes_on = [(false, false), (true, false), (false, true)][random.below(3) as usize];
     for node in NODES {
         let mut write = |index, sub, value, bytes| session.write_sized(node, index, sub, value, bytes);
         write(0x6007, 0, option, 2)?;
@@ -98,17 +113,22 @@ pub fn lost(machines: &mut Machines<'_>, seed: u64) -> Result<Verdict, ToolError
         if speaks[0] && cycle.is_multiple_of(beat) {
             send(session, Frame::new(HEARTBEAT, &[5]));
         }
-        if speaks[1] {
+        if speaks[1] || goes_on.0 {
             send(session, Frame::new(SYNC, &[]));
+        }
+        if speaks[1] || goes_on.1 {
             send(session, targets(hosted.positions, 0.0));
         }
         session.run(CYCLE_S)?;
     }
     let heard = session.chip_mut().can.heard.take().unwrap_or_default();
-    let last = |id| heard.iter().rev().find(|(_, frame)| frame.id() == id).map_or(0, |(at, _)| *at);
-    let due = [(0, HEARTBEAT), (1, TARGETS)].into_iter().filter(|(way, _)| silent[*way]);
-    let due = due.map(|(way, id)| last(id) + ticks(1e-3 * f64::from(times_ms[way]))).min().unwrap_or(0);
-    let what = format!("silent {silent:?}, own times {times_ms:?} ms, 6007 = {option}");
+    let heartbeat = heard.iter().rev().find(|(_, frame)| frame.id() == HEARTBEAT).map_or(0, |(at, _)| *at);
+    let last = [heartbeat, last_valid(&heard)];
+    let due = (0..2).filter(|way| silent[*way]);
+    let due = due.map(|way| last[way] + ticks(1e-3 * f64::from(times_ms[way]))).min().unwrap_or(0);
+    let what = format!(
+        "silent {silent:?}, SYNC and targets go on: {goes_on:?}, own times {times_ms:?} ms, 6007 = {option}"
+    );
     let released = match release(session) {
         Ok(Some(released)) => released,
         Ok(None) => return Ok(Err(format!("{what}: no reaction"))),

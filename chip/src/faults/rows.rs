@@ -160,7 +160,7 @@ pub(super) const ROWS: &[Row] = &[
             session.machine.hang(Some(SERVO));
             false
         }),
-    own(&catalogue::B1, bus::lost).case("host's heartbeat or targets end"),
+    own(&catalogue::B1, bus::lost).case("host's heartbeat, targets or SYNC end"),
     injected(&catalogue::B2, Situation::Motion, Expected::Nothing, |chip, _| {
         let now = chip.now;
         chip.can.go_bus_off(now);

@@ -56,6 +56,7 @@ const RATE_HZ: f64 = 0.7;
 /// Frames that the host sends by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Speaks {
+    /// SYNC.
     pub(crate) sync: bool,
     /// Targets, which the next SYNC makes valid.
     pub(crate) targets: bool,

@@ -4,11 +4,11 @@
 //! below 100 ms) and 6007 (1 or 3). First the host pauses three times for less than 95 ms: no fault may be
 //! reported.
 //!
-//! In a quarter of the runs the host then stops its controlwords, or its targets, or SYNC and targets, and
-//! continues the others. Again no fault may be reported, and the run counts as undetectable. In the other
-//! runs it stops completely, or sends targets without a SYNC, which have no effect. Its timeout is 100 ms
-//! after the last SYNC or controlword that a node received. The requirements are those of B1: damped,
-//! reported within 10 ms, and not enabled by a host that returns.
+//! In a quarter of the runs the host then stops its controlwords, its targets, its SYNC, or two of them, and
+//! continues the others; targets without SYNC only beside controlwords. Again no fault may be reported, and
+//! the run counts as undetectable. In the other runs it stops completely, or sends targets without a SYNC,
+//! which have no effect. Its timeout is 100 ms after the last SYNC or controlword that a node received. The
+//! requirements are those of B1: damped, reported within 10 ms, and not enabled by a host that returns.
 
 use scarab::safety::FaultCode;
 use scarab_base::error::ToolError;
@@ -23,6 +23,14 @@ use crate::faults::run::Outcome;
 
 /// Timeout for cycles of less than 10 ms, ns.
 const TIME_NS: u64 = 100_000_000;
+/// SYNC, targets and controlwords of a host that gives up some of them.
+const KEPT: [(bool, bool, bool); 5] = [
+    (true, true, false),
+    (true, false, false),
+    (true, false, true),
+    (false, true, true),
+    (false, false, true),
+];
 /// Longest pause, servo ticks: 95 ms.
 const PAUSE: u64 = 380;
 
@@ -50,9 +58,7 @@ fn one(mut fork: Fork<'_>, blind: bool) -> Result<Outcome, ToolError> {
     fork.run(800);
     let mut false_alarm = !fork.host.is_enabled();
     if fork.random.below(4) == 0 {
-        let (sync, targets, words) =
-            [(true, true, false), (true, false, false), (true, false, true), (false, false, true)]
-                [fork.random.below(4) as usize];
+        let (sync, targets, words) = KEPT[fork.random.below(KEPT.len() as u64) as usize];
         fork.host.speaks = Speaks { sync, targets, words, heartbeat: 0 };
         fork.run(2000);
         false_alarm |= !fork.host.is_enabled();
