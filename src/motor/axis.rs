@@ -440,10 +440,10 @@ impl Axis {
         }
         let bus = constants.sense.bus(sample.bus_code);
         let limit = self.current_limit;
-        let target = Ampere(clamp(wanted.0 * constants.current_sign, -limit, limit));
+        let quadrature = Ampere(clamp(wanted.0 * constants.current_sign, -limit, limit));
         let voltage = self.current_loop.voltage(
             &constants.gains,
-            target,
+            Rotating { d: Ampere::ZERO, q: quadrature },
             self.measured,
             self.speed.rad_per_s(),
             constants.modulator.voltage_limit(bus),
@@ -451,7 +451,7 @@ impl Axis {
         if !is_finite(voltage.d.0 + voltage.q.0) {
             return Err(AxisFault::NotANumber);
         }
-        let target = Stationary::from_quadrature(target, acting);
+        let target = Stationary::from_quadrature(quadrature, acting);
         if self.shunt_watch.is_stuck(sample.shunt_codes, target, constants.stuck_change) {
             return Err(AxisFault::StuckConversion);
         }

@@ -148,24 +148,9 @@ impl CurrentLoop {
         Self { integral_v: Rotating { d: voltage.d.0, q: voltage.q.0 } }
     }
 
-    /// Computes the voltage for a quadrature current `target` and zero direct current, no longer than
-    /// `limit`; `speed_rad_per_s` is electrical.
+    /// Computes the voltage for a current `target`, no longer than `limit`; `speed_rad_per_s` is electrical.
     #[inline(always)]
-    pub(crate) fn voltage(
-        &mut self,
-        gains: &CurrentGains,
-        target: Ampere,
-        measured: Rotating<Ampere>,
-        speed_rad_per_s: f32,
-        limit: Volt,
-    ) -> Rotating<Volt> {
-        let target = Rotating { d: Ampere::ZERO, q: target };
-        self.voltage_for(gains, target, measured, speed_rad_per_s, limit)
-    }
-
-    /// [`Self::voltage`] for a current with both components.
-    #[inline(always)]
-    pub(super) fn voltage_for(
+    pub(super) fn voltage(
         &mut self,
         gains: &CurrentGains,
         target: Rotating<Ampere>,

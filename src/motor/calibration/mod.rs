@@ -195,7 +195,7 @@ impl FieldCurrent {
         let frame = frame.rotation();
         let measured = reading.current.to_rotating(frame);
         let limit = reading.bench.settings.voltage;
-        self.current_loop.voltage_for(&self.gains, target, measured, 0.0, limit).to_stationary(frame)
+        self.current_loop.voltage(&self.gains, target, measured, 0.0, limit).to_stationary(frame)
     }
 }
 

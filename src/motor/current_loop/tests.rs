@@ -37,11 +37,20 @@ fn gains(bandwidth: f32, feedforward: bool) -> CurrentGains {
     CurrentGains::new(&MOTOR, Hertz(bandwidth), feedforward).expect("usual")
 }
 
+fn quadrature(q: Ampere) -> Rotating<Ampere> {
+    Rotating { d: Ampere::ZERO, q }
+}
+
 fn settled(plant: &mut Plant, gains: &CurrentGains, target: f32, limit: f32, ticks: usize) -> CurrentLoop {
     let mut current_loop = CurrentLoop::default();
     for _ in 0..ticks {
-        let volts =
-            current_loop.voltage(gains, Ampere(target), plant.measured(), plant.speed as f32, Volt(limit));
+        let volts = current_loop.voltage(
+            gains,
+            quadrature(Ampere(target)),
+            plant.measured(),
+            plant.speed as f32,
+            Volt(limit),
+        );
         plant.step(volts);
     }
     current_loop
@@ -57,7 +66,8 @@ fn a_step_arrives_without_error_with_the_overshoot_of_its_phase_margin() {
         let mut current_loop = CurrentLoop::default();
         let (mut peak, mut crossed) = (0.0_f64, None);
         for tick in 0..600 {
-            let volts = current_loop.voltage(&gains, Ampere(10.0), plant.measured(), 0.0, Volt(24.0));
+            let volts =
+                current_loop.voltage(&gains, quadrature(Ampere(10.0)), plant.measured(), 0.0, Volt(24.0));
             plant.step(volts);
             peak = peak.max(plant.current[1]);
             if plant.current[1] > 6.32 && crossed.is_none() {
@@ -84,7 +94,8 @@ fn feedforward_keeps_a_step_of_one_axis_out_of_the_other() {
         let mut current_loop = settled(&mut plant, &gains, 0.0, 24.0, 2000);
         let mut worst = 0.0_f64;
         for _ in 0..200 {
-            let volts = current_loop.voltage(&gains, Ampere(20.0), plant.measured(), 1500.0, Volt(24.0));
+            let volts =
+                current_loop.voltage(&gains, quadrature(Ampere(20.0)), plant.measured(), 1500.0, Volt(24.0));
             plant.step(volts);
             worst = worst.max(plant.current[0].abs());
         }
@@ -99,7 +110,8 @@ fn feedforward_keeps_a_step_of_one_axis_out_of_the_other() {
 fn the_sign_of_each_feedforward_is_the_motors() {
     let gains = gains(1000.0, true);
     let at_rest = Rotating { d: Ampere(2.0), q: Ampere(3.0) };
-    let volts = |speed| CurrentLoop::default().voltage(&gains, Ampere(3.0), at_rest, speed, Volt(24.0));
+    let volts =
+        |speed| CurrentLoop::default().voltage(&gains, quadrature(Ampere(3.0)), at_rest, speed, Volt(24.0));
     let (forward, still) = (volts(1000.0), volts(0.0));
     assert!((forward.d.0 - still.d.0 + 1000.0 * 27e-6 * 3.0).abs() < 1e-5, "{forward:?} {still:?}");
     assert!((forward.q.0 - still.q.0 - 1000.0 * (24e-6 * 2.0 + 2.9e-3)).abs() < 1e-5);
@@ -112,7 +124,8 @@ fn at_the_limit_the_field_stays_and_the_voltage_never_exceeds_it() {
     let mut plant = Plant::at(1600.0);
     let mut current_loop = CurrentLoop::default();
     for tick in 0..4000 {
-        let volts = current_loop.voltage(&gains, Ampere(40.0), plant.measured(), 1600.0, Volt(5.0));
+        let volts =
+            current_loop.voltage(&gains, quadrature(Ampere(40.0)), plant.measured(), 1600.0, Volt(5.0));
         assert!(volts.d.0 * volts.d.0 + volts.q.0 * volts.q.0 <= 25.001);
         plant.step(volts);
         if tick > 1000 {
@@ -130,7 +143,8 @@ fn nothing_winds_up_at_the_limit() {
         let mut current_loop = settled(&mut plant, &gains, 40.0, 5.0, ticks_at_limit);
         let mut last_outside = 0;
         for tick in 0..2000 {
-            let volts = current_loop.voltage(&gains, Ampere(0.0), plant.measured(), 1600.0, Volt(5.0));
+            let volts =
+                current_loop.voltage(&gains, quadrature(Ampere(0.0)), plant.measured(), 1600.0, Volt(5.0));
             plant.step(volts);
             if plant.current[1].abs() > 0.5 {
                 last_outside = tick;
@@ -172,7 +186,8 @@ fn a_loop_that_takes_over_goes_on_with_the_voltage_that_held_the_current() {
     let gains = CurrentGains::new(&MOTOR, Hertz(1000.0), false).expect("usual");
     let held = Rotating { d: Volt(1.5), q: Volt(-0.5) };
     let current = Rotating { d: Ampere::ZERO, q: Ampere(7.0) };
-    let voltage = CurrentLoop::holding(held).voltage(&gains, Ampere(7.0), current, 0.0, Volt(20.0));
+    let voltage =
+        CurrentLoop::holding(held).voltage(&gains, quadrature(Ampere(7.0)), current, 0.0, Volt(20.0));
     assert!((voltage.d.0 - 1.5).abs() < 1e-6 && (voltage.q.0 + 0.5).abs() < 1e-6, "{voltage:?}");
 }
 
