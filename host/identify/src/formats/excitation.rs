@@ -103,7 +103,7 @@ pub fn geometry(leg: &LegFile) -> String {
         add(joint.name.as_bytes());
         add(&[0]);
         add(&joint.direction.to_le_bytes());
-        for number in [joint.dh.alpha, joint.dh.a, joint.dh.d, joint.zero_offset_deg] {
+        for number in [joint.dh.twist(), joint.dh.a, joint.dh.d, joint.zero_offset_deg] {
             // Adding zero makes -0 and 0 the same geometry.
             add(&(number + 0.0).to_bits().to_le_bytes());
         }

@@ -226,6 +226,19 @@ pub struct DhFile {
     pub d: f64,
 }
 
+/// Difference from a right angle, or half a turn, that is taken for rounding, rad: as in 1.57 or 3.1416.
+const ROUNDED_RAD: f64 = 1e-3;
+
+impl DhFile {
+    /// Twist with which the leg is computed, rad: a right angle or half a turn where the file rounds one. A
+    /// fraction of a milliradian would only distinguish parameters that no motion shows.
+    pub fn twist(&self) -> f64 {
+        let quarters = (self.alpha / std::f64::consts::FRAC_PI_2).round();
+        let right = quarters * std::f64::consts::FRAC_PI_2;
+        if quarters != 0.0 && (self.alpha - right).abs() <= ROUNDED_RAD { right } else { self.alpha }
+    }
+}
+
 /// Encoder of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -194,9 +194,9 @@ fn base(xml: &mut Xml, gravity: &Vector3<f64>) -> io::Result<()> {
 
 fn joint(xml: &mut Xml, link: &Link<'_>, parent: &str, child: &str) -> io::Result<()> {
     let stored = link.joint;
-    let (sine, cosine) = stored.dh.alpha.sin_cos();
+    let (sine, cosine) = stored.dh.twist().sin_cos();
     let position = Vector3::new(stored.dh.a, -stored.dh.d * sine, stored.dh.d * cosine);
-    let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), stored.dh.alpha)
+    let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), stored.dh.twist())
         * Rotation3::from_axis_angle(&Vector3::z_axis(), stored.zero_offset_deg.to_radians());
     comment(
         xml,

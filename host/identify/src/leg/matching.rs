@@ -75,7 +75,7 @@ fn joint_differences(number: usize, stored: &StoredJoint, joint: &JointFile) -> 
     let length = if number == 0 { "length `a` before" } else { "length `a` from the joint before" };
     compare(length, "m", stored.dh.a, joint.dh.a);
     compare("offset `d`", "m", stored.dh.d, joint.dh.d);
-    compare("twist `alpha`", "rad", stored.dh.alpha, joint.dh.alpha);
+    compare("twist `alpha`", "rad", stored.dh.twist(), joint.dh.twist());
     compare("zero offset", "deg", stored.zero_offset_deg, joint.zero_offset_deg);
     compare("torque constant", "N m/A", stored.torque_per_ampere, joint.torque_per_ampere);
     if stored.direction != joint.direction {

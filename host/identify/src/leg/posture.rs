@@ -72,7 +72,7 @@ fn flexion_axis(leg: &LegFile) -> Unit<Vector3<f64>> {
     let mut direction = 1.0;
     for joint in leg.joints.iter().take(hip + 1) {
         let zero = joint.zero_offset_deg.to_radians();
-        frame *= Rotation3::from_axis_angle(&Vector3::x_axis(), joint.dh.alpha)
+        frame *= Rotation3::from_axis_angle(&Vector3::x_axis(), joint.dh.twist())
             * Rotation3::from_axis_angle(&Vector3::z_axis(), zero);
         direction = joint.direction as f64;
     }

@@ -24,7 +24,7 @@ pub struct Stick {
 
 /// Rotation and position of a joint's frame in the previous one.
 fn placed(joint: &DhFile, angle: f64) -> (Matrix3<f64>, Vector3<f64>) {
-    let ((sa, ca), (sq, cq)) = (joint.alpha.sin_cos(), angle.sin_cos());
+    let ((sa, ca), (sq, cq)) = (joint.twist().sin_cos(), angle.sin_cos());
     let rotation = Matrix3::new(cq, -sq, 0.0, sq * ca, cq * ca, -sa, sq * sa, cq * sa, ca);
     (rotation, Vector3::new(joint.a, -joint.d * sa, joint.d * ca))
 }

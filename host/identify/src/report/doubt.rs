@@ -134,8 +134,10 @@ pub(crate) struct DirectionReport {
     pub(crate) name: &'static str,
     /// Joint, from 1; `null` for gravity.
     pub(crate) joint: Option<usize>,
-    /// Estimate; `null` where the motion does not determine it.
+    /// Estimate; `null` where the motion does not determine it, and where the search ended at its limit.
     pub(crate) value: Number,
+    /// Whether the search ended at its limit.
+    pub(crate) at_limit: bool,
     /// Standard deviation: the larger of noise and scatter over segments.
     pub(crate) sigma: Number,
     /// Source of the standard deviation: `noise` or `segments`.
@@ -184,7 +186,11 @@ impl DirectionReport {
     pub fn words(&self) -> String {
         let joint = self.joint.unwrap_or(0);
         let (Some(value), Some(sigma)) = (self.value.known(), self.sigma.known()) else {
-            return format!("{}: not shown by this motion", self.subject());
+            return if self.at_limit {
+                format!("{}: not determined, the search ended at its limit", self.subject())
+            } else {
+                format!("{}: not shown by this motion", self.subject())
+            };
         };
         let size = format!("{:.*} +- {:.*}", digits(sigma), value.abs(), digits(sigma), sigma);
         let negative = value < 0.0;

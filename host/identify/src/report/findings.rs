@@ -6,6 +6,10 @@ use serde::{Deserialize, Serialize};
 use scarab_base::number::Number;
 use scarab_base::words::{Word, word};
 
+/// Largest error of a length, as share, and of a zero, rad, that a step from the model still estimates.
+const LINEAR_LENGTH: f64 = 0.3;
+const LINEAR_ZERO_RAD: f64 = 0.35;
+
 /// One test of the verdict, with its result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FindingReport {
@@ -215,7 +219,22 @@ fn other_geometry(evidence: &Evidence<f32>, joint: usize) -> String {
         let found = format!("the zero of joint {joint} {degrees:+.1} degrees from the configured one");
         (found, format!("{limit:.1} degrees"), "another length")
     };
+    if !is_small(evidence.test.name(), value) {
+        return format!(
+            "the torque contradicts the model like another length before joint {joint} or another zero, of a size that is \
+             not determined"
+        );
+    }
     format!(
         "the torque indicates another geometry: {found}, limit {limit}; {alike} or a leaning trunk looks alike"
     )
+}
+
+/// Whether an error of length or zero is so small that its linear estimate means something.
+pub(crate) fn is_small(test: &str, value: f64) -> bool {
+    match test {
+        name if name == Test::LinkLength.name() => value.abs() <= LINEAR_LENGTH,
+        name if name == Test::EncoderZero.name() => value.abs() <= LINEAR_ZERO_RAD,
+        _ => false,
+    }
 }

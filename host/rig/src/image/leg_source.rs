@@ -38,7 +38,7 @@ pub fn describe(leg: &LegFile, swarm_seed: u64) -> Result<Described, FileError> 
         let single = |value: f64| value as f32;
         JointDescription {
             geometry: DenavitHartenberg {
-                alpha: single(file.dh.alpha),
+                alpha: single(file.dh.twist()),
                 a: single(file.dh.a),
                 d: single(file.dh.d),
             },

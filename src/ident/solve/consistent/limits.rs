@@ -13,10 +13,11 @@
 //!
 //! Without a prior the limits come from geometry and torque. The centre of mass is within a segment's length
 //! of the joint. The last segment counts as long as the longest known one, 1 m where none is known. Masses
-//! reach up to what ten times the measured torque could need; rotor, friction and offset as in the box of the
-//! base set ([`crate::ident::solve::bounds`]). A neutral leg replaces the prior: a twentieth of these limits,
-//! centres of mass at the joints. Its standard deviations equal its own size ([`Limits::deviations`]), so a
-//! zero in it carries no information.
+//! reach up to what ten times the measured torque could need, and fifty times as far without a length: a
+//! short body needs more mass for the same moment. Rotor, friction and offset are limited as in the box of
+//! the base set ([`crate::ident::solve::bounds`]). A neutral leg replaces the prior: a twentieth of these
+//! limits, centres of mass at the joints. Its standard deviations equal its own size
+//! ([`Limits::deviations`]), so a zero in it carries no information.
 
 use crate::ident::record::motion_record::Record;
 use crate::ident::record::motion_record::Selection;
@@ -35,6 +36,8 @@ const SHARE: (f64, f64) = (0.2, 5.0);
 const SMALLEST_SHAPE: f64 = 0.1;
 /// Length of a segment where the geometry gives none, m.
 const UNKNOWN_LENGTH_M: f64 = 1.0;
+/// Factor of a mass's limit where no length is known.
+const UNKNOWN_LENGTH_ROOM: f64 = 50.0;
 /// Parameters of a neutral leg over the most that the torque could need.
 const NEUTRAL_SHARE: f64 = 0.05;
 /// Extent of a ball over its radius of gyration, 1 / sqrt(3).
@@ -74,6 +77,7 @@ impl<T: Real, const N: usize> Limits<T, N> {
     ) -> Self {
         let measured = measured_box(model, record);
         let neutral = neutral(model, record, &measured.high);
+        let room = if longest(model) > T::zero() { T::one() } else { T::from_double(UNKNOWN_LENGTH_ROOM) };
         let believed = prior.unwrap_or(&neutral);
         let links = core::array::from_fn(|joint| {
             let link = &believed[joint];
@@ -98,7 +102,7 @@ impl<T: Real, const N: usize> Limits<T, N> {
                 mass: if prior.is_some() {
                     (low * link.body.mass, high * link.body.mass)
                 } else {
-                    (T::zero(), link.body.mass / T::from_double(NEUTRAL_SHARE))
+                    (T::zero(), room * link.body.mass / T::from_double(NEUTRAL_SHARE))
                 },
                 centre: core::array::from_fn(|axis| link.body.centre_of_mass[axis]),
                 reach: T::from_double(0.5) * length,
@@ -256,9 +260,8 @@ impl<T: Real> LinkLimits<T> {
 
 /// Length of a segment as far as the geometry gives it.
 fn known_length<T: Real, const N: usize, const B: usize>(model: &RowModel<T, N, B>, joint: usize) -> T {
-    let length = |index: usize| model.chain.distance_to(index).unwrap_or(T::zero());
-    let own = length(joint + 1);
-    let longest = (1..N).fold(T::zero(), |longest, index| real::max(longest, length(index)));
+    let own = model.chain.distance_to(joint + 1).unwrap_or(T::zero());
+    let longest = longest(model);
     if own > T::zero() {
         own
     } else if longest > T::zero() {
@@ -266,6 +269,12 @@ fn known_length<T: Real, const N: usize, const B: usize>(model: &RowModel<T, N, 
     } else {
         T::from_double(UNKNOWN_LENGTH_M)
     }
+}
+
+/// Longest segment that the geometry gives; zero where it gives none.
+fn longest<T: Real, const N: usize, const B: usize>(model: &RowModel<T, N, B>) -> T {
+    let lengths = (1..N).filter_map(|index| model.chain.distance_to(index));
+    lengths.fold(T::zero(), real::max)
 }
 
 /// Priors of links known only by geometry and torque.

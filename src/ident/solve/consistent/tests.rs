@@ -283,6 +283,19 @@ fn legs_of_one_joint_without_prior_and_without_some_columns_are_completed() {
 }
 
 #[test]
+fn a_short_body_without_prior_and_length_costs_nothing() {
+    let mut random = TestRandom::new(9);
+    let mut mask = [[true; 14]; 1];
+    mask[0][Parameter::IA.index()] = false;
+    let model = model::<f64, 1>(&mask);
+    // 7 cm from the axis, 3 cm of gyration: 20 kg for a moment of 1.4 kg m.
+    let short = [link(20.0, [0.072, 0.0, 0.0], [0.02, 0.02, 0.02], [0.0, 0.3, 0.1, 0.0])];
+    let record = record(&mut random, &model, &model.base.project(&prior_parameters(&short)));
+    let (completion, _) = complete::<f32, 1>(&mask, &record, None, Effort::device(false));
+    assert!(excess(&mask, &record, &completion.parameters()) < 0.1);
+}
+
+#[test]
 fn every_point_of_the_full_box_is_a_leg_and_slices_do_not_change_the_search() {
     let mut random = TestRandom::new(6);
     let (model64, model32) = (model::<f64, 2>(&ALL), model::<f32, 2>(&ALL));

@@ -70,7 +70,7 @@ impl JointFile {
 
     fn description(&self, truth: &LinkParameters) -> JointDescription {
         JointDescription {
-            frame: DenavitHartenberg { alpha: self.dh.alpha, a: self.dh.a, d: self.dh.d },
+            frame: DenavitHartenberg { alpha: self.dh.twist(), a: self.dh.a, d: self.dh.d },
             direction: self.direction as f64,
             zero_offset: self.zero_offset_deg.to_radians(),
             body: BodyDescription { mass: truth.mass, com: truth.com, inertia_com: truth.inertia_com },

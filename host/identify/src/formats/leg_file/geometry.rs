@@ -10,7 +10,7 @@ pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, FileError> 
     let geometry: Vec<_> = leg
         .joints
         .iter()
-        .map(|joint| DenavitHartenberg { alpha: joint.dh.alpha, a: joint.dh.a, d: joint.dh.d })
+        .map(|joint| DenavitHartenberg { alpha: joint.dh.twist(), a: joint.dh.a, d: joint.dh.d })
         .collect();
     let count = geometry.len();
     let geometry: [_; N] =
@@ -44,4 +44,24 @@ pub fn fingerprint(leg: &LegFile) -> Result<String, FileError> {
         _ => with_joints::<3>(leg),
     }?;
     Ok(format!("{:016x}", fingerprint.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use crate::formats::leg_file::DhFile;
+
+    #[test]
+    fn a_rounded_right_angle_is_taken_as_one() {
+        let twist = |alpha| DhFile { alpha, a: 0.0, d: 0.0 }.twist();
+        let rounded =
+            |angle: f64, decimals: i32| (angle * 10_f64.powi(decimals)).round() / 10_f64.powi(decimals);
+        for (angle, decimals) in [(FRAC_PI_2, 4), (-FRAC_PI_2, 3), (FRAC_PI_2, 2), (PI, 4), (PI, 9)] {
+            assert_eq!(twist(rounded(angle, decimals)), angle);
+        }
+        for kept in [0.0, 1e-5, -0.3, 1.56, FRAC_PI_2 + 2e-3, rounded(PI, 2)] {
+            assert_eq!(twist(kept), kept);
+        }
+    }
 }

@@ -8,11 +8,16 @@
 //!
 //! Ranking: findings about samples first, then the plausible correction that leaves least of the misfit.
 //! Where the uncorrected fit is not plausible, a correction must make it so. Otherwise the correction must
-//! halve the misfit's power, or be a direction that refuses. Another leg is named only where a link's length
-//! or a zero is significant.
+//! halve the misfit's power, or be a direction that refuses. Whatever explains less than half of the misfit
+//! beyond noise is a symptom, and the cause is unknown; but a wrong sign may fit as well as the right one.
+//! Others that leave as much as the named one are listed beside it. Another leg is named only where a link's
+//! length or a zero is significant, and off by no more than its linear estimate can tell.
+
+use scarab::ident::Test;
 
 use crate::report::doubt::{CauseReport, DirectionReport, ReadAs, SampleFinding};
-use crate::report::findings::FindingReport;
+use crate::report::findings::{FindingReport, is_small};
+use crate::run::logging_errors::assumption::{self, Replaced};
 use crate::run::logging_errors::directions::{CHANCE, Directions, Found, label};
 use crate::run::logging_errors::fit::segment_sigma;
 use crate::run::logging_errors::lag::{self, Lag};
@@ -27,12 +32,16 @@ const NEGATIVE_SIGMA: f64 = 5.0;
 const PLAUSIBLE_RATIO: f64 = 30.0;
 /// Part of the misfit that a correction may leave where the uncorrected fit is plausible.
 const HALVED: f64 = 0.7;
-/// Significance of a direction that is named where no other cause is found.
-const WEAKER: f64 = 3.0;
+/// Share of the misfit beyond noise that a correction must explain to be the cause.
+const HALF: f64 = 0.5;
+/// Share of the misfit from which a correction that is not the cause is mentioned.
+const SYMPTOM: f64 = 0.1;
 /// Misfits closer than this ratio count as equal: the simpler correction is named.
 const EQUAL: f64 = 1.1;
 /// Misfit over the torque up to which one correction may be all that is wrong.
 const SMALL_MISFIT: f64 = 0.2;
+/// Misfit over the torque that a good sensor's noise makes.
+const CLEAN_MISFIT: f64 = 0.04;
 /// Misfits closer than this ratio are those of mirrored legs.
 const MIRRORED: f64 = 1.001;
 
@@ -63,6 +72,22 @@ struct Tried {
     is_shared: bool,
 }
 
+impl Tried {
+    /// Share of the misfit's power that the correction explains.
+    fn explains(&self, here: Quality) -> f64 {
+        1.0 - (self.quality.remaining / here.remaining.max(1e-300)).powi(2)
+    }
+
+    /// Whether the correction makes a leg possible that was not, and leaves mostly noise; `systematic` is the
+    /// part of the present misfit that is none.
+    fn restores(&self, here: Quality, systematic: f64) -> bool {
+        let left = 1.0 - self.explains(here);
+        // The noise is that of the recorded unit, so a factor makes all of it systematic.
+        let is_noise = left - (1.0 - systematic) < HALF * left || self.quality.remaining < CLEAN_MISFIT;
+        !here.sound && is_noise && self.quality.remaining <= EQUAL * here.remaining
+    }
+}
+
 /// Names the most likely cause of a refusal.
 pub(crate) fn likely<const N: usize, const B: usize>(
     question: &Question<N, B>,
@@ -73,7 +98,7 @@ pub(crate) fn likely<const N: usize, const B: usize>(
     if let Some(finding) = samples.iter().find(|finding| finding.refuses) {
         return sample_cause(finding);
     }
-    if let Some(cause) = motionless(findings) {
+    if let Some(cause) = without_torque(findings).or_else(|| motionless(findings)) {
         return cause;
     }
     let Some(errors) = errors else { return excluded(samples).unwrap_or_else(unknown) };
@@ -94,8 +119,10 @@ pub(crate) fn likely<const N: usize, const B: usize>(
     // Before the delays, because a low-pass is tried only where it fits clearly better than a delay.
     let lags = lag::all(&errors.equations).into_iter().filter(|lag| lag.significance > CHANCE);
     tried.extend(lags.map(|lag| of_lag(question, errors, lag, here)));
+    let assumptions = assumption::all(&errors.equations);
+    tried.extend(assumptions.into_iter().map(|other| of_assumption(question, errors, other, here)));
     for (found, report) in errors.found.iter().zip(&errors.directions) {
-        let certain = found.significance() > CHANCE && (!report.passed || !here.sound);
+        let certain = found.significance() > CHANCE && !found.at_limit && (!report.passed || !here.sound);
         if certain {
             tried.push(of_direction(question, errors, found, report, here));
         }
@@ -103,14 +130,18 @@ pub(crate) fn likely<const N: usize, const B: usize>(
     let midway = errors.midway.as_ref().filter(|midway| midway.refuses());
     tried.extend(midway.map(|midway| changed_midway(midway, here)));
     tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
+    let needed = HALF * errors.systematic;
     let refused: Vec<bool> = tried.iter().map(|tried| is_refusing(errors, &tried.cause)).collect();
     let passing = tried.into_iter().zip(refused).filter(|(tried, refused)| {
         tried.quality.sound && (!here.sound || *refused || tried.quality.remaining < HALVED * here.remaining)
     });
-    let best = nearest(passing.map(|(tried, _)| tried).collect());
-    let geometry = findings
-        .iter()
-        .find(|finding| !finding.passed && matches!(finding.test, "link_length" | "encoder_zero"));
+    let (best, lesser): (Vec<Tried>, Vec<Tried>) = passing
+        .map(|(tried, _)| tried)
+        .partition(|tried| tried.explains(here) >= needed || tried.restores(here, errors.systematic));
+    let best = nearest(best);
+    let geometry = findings.iter().find(|finding| {
+        !finding.passed && finding.value.known().is_some_and(|value| is_small(finding.test, value))
+    });
     match (best, geometry) {
         (Some(best), _) => best,
         (None, Some(finding)) => CauseReport {
@@ -120,8 +151,19 @@ pub(crate) fn likely<const N: usize, const B: usize>(
             words: finding.words.clone(),
             ..CauseReport::default()
         },
-        (None, None) => weaker(question, errors, here).or_else(|| excluded(samples)).unwrap_or_else(unknown),
+        (None, None) => excluded(samples).unwrap_or_else(|| undecided(lesser, here)),
     }
+}
+
+/// A torque that is always zero as the cause.
+fn without_torque(findings: &[FindingReport]) -> Option<CauseReport> {
+    let finding = findings.iter().find(|finding| !finding.passed && finding.test == Test::Torque.name())?;
+    Some(CauseReport {
+        name: "no_torque",
+        joint: finding.joint,
+        words: format!("{}: is the column the measured torque?", finding.words),
+        ..CauseReport::default()
+    })
 }
 
 /// A joint that hardly moved as the cause.
@@ -195,6 +237,8 @@ fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
     let least = passing.iter().map(|tried| tried.quality.remaining).fold(f64::INFINITY, f64::min);
     passing.retain(|tried| tried.quality.remaining <= EQUAL * least);
     let name = passing.first()?.cause.name;
+    let mut others: Vec<&str> = passing.iter().map(|tried| tried.cause.name).collect();
+    others.dedup();
     passing.retain(|tried| tried.cause.name == name);
     passing.sort_by(|one, other| one.quality.remaining.total_cmp(&other.quality.remaining));
     let mut all = passing.into_iter();
@@ -209,22 +253,11 @@ fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
     if best.is_shared {
         best.cause.joint = None;
     }
+    others.retain(|other| *other != name);
+    if !others.is_empty() {
+        best.cause.words += &format!("; not told apart from: {}", others.join(", ").replace('_', " "));
+    }
     Some(best.cause)
-}
-
-/// Direction that is not significant enough to refuse by itself, named after another refusal.
-fn weaker<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    errors: &LoggingErrors<N, B>,
-    here: Quality,
-) -> Option<CauseReport> {
-    let pairs = errors.found.iter().zip(&errors.directions);
-    let likely = pairs.filter(|(found, report)| {
-        found.significance() > WEAKER
-            && found.explained() > 0.3 * report.explained_limit.known().unwrap_or(1.0)
-    });
-    let tried = likely.map(|(found, report)| of_direction(question, errors, found, report, here));
-    nearest(tried.filter(|tried| tried.quality.sound).collect())
 }
 
 /// Saturated stretches whose exclusion leaves too little to judge.
@@ -232,14 +265,26 @@ fn excluded(samples: &[SampleFinding]) -> Option<CauseReport> {
     samples.iter().find(|finding| finding.name == SATURATION).map(sample_cause)
 }
 
-fn unknown() -> CauseReport {
+/// No cause, with the correction that explains most of the misfit, if one helps at all.
+fn undecided(mut tried: Vec<Tried>, here: Quality) -> CauseReport {
+    tried.sort_by(|one, other| one.quality.remaining.total_cmp(&other.quality.remaining));
+    let best = tried.first().filter(|best| best.explains(here) > SYMPTOM);
+    let symptom = best.map_or(String::new(), |best| {
+        let (name, share) = (best.cause.name.replace('_', " "), 100.0 * best.explains(here));
+        format!("; `{name}` explains {share:.0} % and may be a symptom")
+    });
     CauseReport {
         name: "unknown",
-        words: "no correction of units and no single one of signs, columns, delay, scale or gravity makes the recording \
-                acceptable"
-            .into(),
+        words: format!(
+            "no correction of units and no single one of signs, columns, drives, clock, delay, scale or gravity explains half of \
+             the misfit{symptom}"
+        ),
         ..CauseReport::default()
     }
+}
+
+fn unknown() -> CauseReport {
+    undecided(Vec::new(), Quality { remaining: 1.0, sound: true })
 }
 
 fn is_refusing<const N: usize, const B: usize>(errors: &LoggingErrors<N, B>, cause: &CauseReport) -> bool {
@@ -262,6 +307,19 @@ fn of_lag<const N: usize, const B: usize>(
         && agrees(question, &errors.equations, &lag.columns, &lag.torque);
     let remaining = here.remaining * lag.remaining.sqrt();
     Tried { cause: lag.cause, quality: Quality { remaining, sound }, is_shared: false }
+}
+
+fn of_assumption<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    errors: &LoggingErrors<N, B>,
+    other: Replaced<B>,
+    here: Quality,
+) -> Tried {
+    let sigma = errors.sigma.map(|sigma| sigma.noise.max(sigma.segments));
+    let sound = is_sound(question, &other.values, &sigma)
+        && agrees(question, &errors.equations, &other.columns, &other.torque);
+    let remaining = here.remaining * other.remaining.sqrt();
+    Tried { cause: other.cause, quality: Quality { remaining, sound }, is_shared: false }
 }
 
 fn of_direction<const N: usize, const B: usize>(
@@ -486,7 +544,29 @@ fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
             }
         }
     }
+    for joint in 1..N {
+        for (sign, word) in [(1.0, "plus"), (-1.0, "minus")] {
+            all.push(Correction {
+                name: "coupled_drive",
+                joint: Some(joint),
+                words: format!(
+                    "torque of joint {joint} {word} that of joint {}: does the drive of joint {} sit before joint {joint}?",
+                    joint + 1,
+                    joint + 1
+                ),
+                reads: Vec::new(),
+                apply: Box::new(move |_, torques| torques[joint - 1] += sign * torques[joint]),
+            });
+        }
+    }
     for joint in (0..N).filter(|_| N > 1) {
+        all.push(Correction {
+            name: "angle_sign",
+            joint: Some(joint),
+            words: format!("angle of joint {} negated", joint + 1),
+            reads: Vec::new(),
+            apply: Box::new(move |angles, _| angles[joint] = -angles[joint]),
+        });
         all.push(Correction {
             name: "direction",
             joint: Some(joint),

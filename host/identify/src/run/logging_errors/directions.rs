@@ -10,20 +10,24 @@
 //!
 //! Each is a nonlinear least-squares problem in d and p, solved by Gauss-Newton with p eliminated (Golub and
 //! Pereyra 1973). A delay starts from the best of a scan, because its cost is not convex beyond a quarter of
-//! a period; gravity starts from the best of 24 directions. The column of a delay is the slope of the
+//! a period; gravity starts from the best of 24 directions. Both are solved from zero too, and the solution
+//! near zero holds unless the far one costs less by what chance never gives: gravity turned by 180 degrees
+//! fits a leg with weak coupling almost as well as none. The column of a delay is the slope of the
 //! *predicted* torque. The slope of the measured torque contains noise, which would count as information.
 //!
 //! A direction refuses when all of these hold:
 //!
 //! ```text
-//! |d| > 5.2 sigma                     sigma: the larger of noise and scatter over segments
+//! |d| > 5.2 sigma                     sigma: the larger of noise and scatter over segments; and the cost
+//!                                     falls by what a linear column of this significance earns
 //! some parameter moves by > 2 sigma   when d is fitted
 //! gain > 0.1 x misfit                 x = 1 - noise^2 / misfit^2, at least 0.02
 //! ```
 //!
-//! The third condition accepts a real machine, whose misfit has mostly other causes. A torque scale common to
-//! all joints is invisible without a known mass. In the plane gravity's direction and the zero of joint 1 are
-//! the same direction.
+//! The third condition accepts a real machine, whose misfit has mostly other causes. A value at the end of
+//! its search is no estimate: it may refuse, but is reported as not determined and never named as the cause.
+//! A torque scale common to all joints is invisible without a known mass. In the plane gravity's direction
+//! and the zero of joint 1 are the same direction.
 
 use std::borrow::Cow;
 
@@ -53,6 +57,8 @@ const SEEN_SHARE: f64 = 1e-8;
 const SCAN_S: (f64, f64, f64) = (-0.040, 0.080, 0.004);
 /// Angles of gravity's scan.
 const GRAVITY_SCAN: usize = 24;
+/// Scale error at which a joint's search ends: nothing of the angle or torque is left below.
+const LEAST_SCALE: f64 = -0.95;
 /// Steps of Gauss-Newton.
 const STEPS: usize = 8;
 
@@ -136,6 +142,8 @@ pub(crate) struct Found<const B: usize> {
     pub(crate) segment_sigma: f64,
     /// Whether the motion determines it at all.
     pub(crate) seen: bool,
+    /// Whether the search ended at its limit.
+    pub(crate) at_limit: bool,
     /// Cost without and with the direction.
     pub(crate) cost: (f64, f64),
     /// Parameters of the training motion, with the direction minus without it.
@@ -153,9 +161,15 @@ impl<const B: usize> Found<B> {
         self.noise_sigma.max(self.segment_sigma)
     }
 
-    /// Value over its standard deviation.
+    /// Standard deviations by which it differs from zero: the smaller of value over sigma and what the cost
+    /// gains. Both are equal for a linear column.
     pub(crate) fn significance(&self) -> f64 {
-        if self.seen { self.value.abs() / self.sigma() } else { 0.0 }
+        if !self.seen {
+            return 0.0;
+        }
+        let (without, with) = self.cost;
+        let gain = (without * (without - with).max(0.0) / with.max(1e-300)).sqrt();
+        (self.value.abs() / self.sigma()).min(gain * self.noise_sigma / self.sigma())
     }
 
     /// Share of the misfit that the direction explains.
@@ -179,6 +193,15 @@ pub(crate) struct Directions<'a, const N: usize, const B: usize> {
     pub(crate) zero: [f64; N],
     /// Axis of the first joint in the base frame.
     pub(crate) axis: Vector3<f64>,
+}
+
+/// A solution beside the parameters.
+struct Solved<'a, const B: usize> {
+    value: f64,
+    at_limit: bool,
+    system: System<'a, B>,
+    fit: Fit<B>,
+    score: Score,
 }
 
 type System<'a, const B: usize> = (Cow<'a, [[f64; B]]>, Cow<'a, [f64]>);
@@ -271,7 +294,8 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
         self.equations.score(fit, &system.0, &system.1, &z)
     }
 
-    fn start(&self, kind: Kind, plain: &Fit<B>) -> f64 {
+    /// Best point of the scan, if it costs less than zero does.
+    fn scanned(&self, kind: Kind, plain: &Fit<B>) -> Option<f64> {
         let cost = |system: System<'_, B>| self.equations.fit(&system.0, &system.1, false).cost;
         let scanned: Vec<(f64, f64)> = match kind {
             Kind::Delay(_) => {
@@ -296,7 +320,7 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
             _ => Vec::new(),
         };
         let best = scanned.into_iter().min_by(|one, other| one.1.total_cmp(&other.1));
-        best.filter(|best| best.1 < plain.cost).map_or(0.0, |best| best.0)
+        best.filter(|best| best.1 < plain.cost).map(|best| best.0)
     }
 
     /// Columns with gravity turned by any angle, from those of three angles: the regressor is linear in
@@ -318,49 +342,65 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
         }
     }
 
-    fn one(&self, kind: Kind, plain: &Fit<B>, training: &Fit<B>) -> Found<B> {
-        let mut value = self.start(kind, plain);
+    /// Gauss-Newton from a start.
+    fn solved(&self, kind: Kind, start: f64) -> Solved<'a, B> {
         let (largest, step) = kind.range();
         let largest = match kind {
             Kind::Delay(_) => self.equations.largest_delay_s(),
             _ => largest,
         };
+        let mut value = start;
+        let mut at_limit = false;
         let mut system = self.system(kind, value);
         let mut fit = self.equations.fit(&system.0, &system.1, false);
-        let mut found = self.score(kind, value, &system, &fit);
+        let mut score = self.score(kind, value, &system, &fit);
         for _ in 0..STEPS {
-            if found.seen < SEEN_SHARE || found.delta.abs() < 0.05 * found.noise_sigma {
+            if score.seen < SEEN_SHARE || score.delta.abs() < 0.05 * score.noise_sigma {
                 break;
             }
-            let next = (value + found.delta.clamp(-step, step)).clamp(-largest, largest);
-            if kind.joint().is_some() && next <= -0.95 {
+            let next = (value + score.delta.clamp(-step, step)).clamp(-largest, largest);
+            at_limit = next.abs() == largest || (kind.joint().is_some() && next <= LEAST_SCALE);
+            if kind.joint().is_some() && next <= LEAST_SCALE {
                 break;
             }
             value = next;
             system = self.system(kind, value);
             fit = self.equations.fit(&system.0, &system.1, false);
-            found = self.score(kind, value, &system, &fit);
+            score = self.score(kind, value, &system, &fit);
         }
         if kind == Kind::Gravity {
             value = (value + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
         }
-        let seen = found.seen >= SEEN_SHARE && found.sigma().is_finite();
+        Solved { value, at_limit, system, fit, score }
+    }
+
+    fn one(&self, kind: Kind, plain: &Fit<B>, training: &Fit<B>) -> Found<B> {
+        let near = self.solved(kind, 0.0);
+        let far = self.scanned(kind, plain).map(|start| self.solved(kind, start));
+        let scatter = (near.score.sigma() / near.score.noise_sigma).powi(2);
+        let earned = |far: &Solved<'_, B>| near.fit.cost - far.fit.cost > CHANCE * CHANCE * scatter;
+        let Solved { value, at_limit, system, fit, score } = match far {
+            Some(far) if earned(&far) => far,
+            _ => near,
+        };
+        let seen = score.seen >= SEEN_SHARE && score.sigma().is_finite();
         // The weights are those of the misfit without the direction.
         let remaining = if plain.cost > 0.0 { (fit.cost / plain.cost).min(1.0).sqrt() } else { 1.0 };
         let with = self.equations.fit(&system.0, &system.1, true);
         Found {
             kind,
             value,
-            noise_sigma: remaining * found.noise_sigma,
-            segment_sigma: found.segment_sigma,
+            noise_sigma: remaining * score.noise_sigma,
+            segment_sigma: score.segment_sigma,
             seen,
+            at_limit,
             cost: (plain.cost, fit.cost),
             shift: core::array::from_fn(
                 |base| if seen { with.values[base] - training.values[base] } else { 0.0 },
             ),
             values: fit.values,
             alike: Vec::new(),
-            column: found.column,
+            column: score.column,
         }
     }
 }

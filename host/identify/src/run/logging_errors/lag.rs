@@ -133,8 +133,8 @@ impl<const N: usize, const B: usize> Search<'_, N, B> {
     }
 }
 
-/// Time of the least cost between two times, by golden section.
-fn least(mut low: f64, mut high: f64, cost: impl Fn(f64) -> f64) -> f64 {
+/// Value of the least cost between two values, by golden section.
+pub(super) fn least(mut low: f64, mut high: f64, cost: impl Fn(f64) -> f64) -> f64 {
     let (mut one, mut other) = (high - SECTION * (high - low), low + SECTION * (high - low));
     let (mut at_one, mut at_other) = (cost(one), cost(other));
     for _ in 0..STEPS {

@@ -16,16 +16,18 @@ impl DirectionReport {
         let largest = shifts.map(|(shift, sigma)| (shift / sigma).abs()).fold(0.0, f64::max);
         let needed = EXPLAINED_SHARE * systematic.max(SMALLEST_SYSTEMATIC);
         let known = |value: f64| if found.seen { Number::from(value) } else { Number::UNKNOWN };
+        let estimate = |value: f64| if found.at_limit { Number::UNKNOWN } else { known(value) };
         let refused =
             found.significance() > CHANCE && largest > TOLERATED_SHIFT && found.explained() > needed;
         Self {
             name: found.kind.name(),
             joint: found.kind.joint().map(|joint| joint + 1),
-            value: known(factor * found.value),
-            sigma: known(factor * found.sigma()),
+            value: estimate(factor * found.value),
+            at_limit: found.at_limit,
+            sigma: estimate(factor * found.sigma()),
             sigma_from: if found.noise_sigma >= found.segment_sigma { "noise" } else { "segments" },
             unit,
-            limit: known(factor * CHANCE * found.sigma()),
+            limit: estimate(factor * CHANCE * found.sigma()),
             explained: known(found.explained()),
             explained_limit: needed.into(),
             largest_shift: known(largest),

@@ -319,6 +319,16 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         score(fit, columns, torque, z, &self.weight, &self.clusters())
     }
 
+    /// Chain angle of a joint at its equations, rad; zero at those of others.
+    pub(crate) fn angles(&self, joint: usize) -> Vec<f64> {
+        let reach = self.filters.low_pass.reach();
+        let angle = |source: &RowSource| {
+            let instant = self.parts[source.motion].instants.get(reach + DECIMATION * source.row);
+            instant.filter(|_| source.joint == joint).map_or(0.0, |instant| instant.position[joint])
+        };
+        self.sources.iter().map(angle).collect()
+    }
+
     /// Unchanged row model.
     pub(crate) fn model(&self) -> &RowModel<f64, N, B> {
         &self.model

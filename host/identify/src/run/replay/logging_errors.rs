@@ -264,7 +264,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             }),
             ..background.model.clone()
         };
-        let (sine, cosine) = self.leg.joints.first().map_or((0.0, 1.0), |joint| joint.dh.alpha.sin_cos());
+        let (sine, cosine) = self.leg.joints.first().map_or((0.0, 1.0), |joint| joint.dh.twist().sin_cos());
         let load = self.load.map(f64::from);
         // The recorded torque includes the load's.
         let prior = background.prior.as_ref().map(|prior| {

@@ -52,7 +52,7 @@ pub(super) fn of_geometry(leg: &LegFile) -> impl Iterator<Item = String> {
         )
     });
     let [x, y, z] = leg.gravity;
-    let (sine, cosine) = first.map_or((0.0, 1.0), |first| first.dh.alpha.sin_cos());
+    let (sine, cosine) = first.map_or((0.0, 1.0), |first| first.dh.twist().sin_cos());
     let along = z * cosine - y * sine;
     let across = (x * x + y * y + z * z - along * along).max(0.0).sqrt();
     let is_parallel = leg.joints.iter().skip(1).all(|joint| joint.dh.alpha == 0.0);
@@ -63,5 +63,18 @@ pub(super) fn of_geometry(leg: &LegFile) -> impl Iterator<Item = String> {
             leg.name
         )
     });
-    ineffective.into_iter().chain(weightless)
+    ineffective.into_iter().chain(weightless).chain(rounded_twists(leg))
+}
+
+/// Twists that are taken as right angles.
+pub fn rounded_twists(leg: &LegFile) -> impl Iterator<Item = String> {
+    leg.joints.iter().filter(|joint| (joint.dh.twist() - joint.dh.alpha).abs() > 1e-9).map(|joint| {
+        format!(
+            "{}: `dh.alpha` of joint `{}` is {} rad and is taken as {:.0} degrees",
+            leg.name,
+            joint.name,
+            joint.dh.alpha,
+            joint.dh.twist().to_degrees()
+        )
+    })
 }

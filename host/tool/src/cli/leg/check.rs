@@ -10,6 +10,7 @@ use scarab_identify::formats::leg_file::draft::truth_text;
 use scarab_identify::formats::leg_file::keys::{KeyLine, PRIOR, TRUTH};
 use scarab_identify::formats::leg_file::{JointFile, LegFile, MissingForImage};
 use scarab_identify::leg::setup::{DEFAULT_SEED, PriorChoice, background, configuration};
+use scarab_identify::run::replay::warnings::rounded_twists;
 use scarab_identify::with_leg_size;
 use scarab_rig::excite::run::designable;
 use scarab_rig::image::leg_source::describe;
@@ -22,6 +23,9 @@ pub fn text(name_or_path: &str) -> Result<String, ToolError> {
     let (leg, missing) = LegFile::load_with_missing(name_or_path)?;
     let names: Vec<_> = leg.joints.iter().map(|joint| format!("`{}`", joint.name)).collect();
     let mut text = format!("{name_or_path}: leg `{}`, joints {}\n", leg.name, names.join(", "));
+    for remark in rounded_twists(&leg) {
+        let _ = writeln!(text, "{remark}");
+    }
     let known = with_leg_size!(&leg, replayable(&leg));
     replay(&mut text, &leg, &known);
     simulation(&mut text, &leg, &known);
