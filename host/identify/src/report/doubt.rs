@@ -228,11 +228,11 @@ impl DirectionReport {
     /// Test of the verdict.
     pub(crate) fn finding(&self) -> FindingReport {
         let failure = (!self.passed).then(|| {
+            let limit =
+                self.limit.known().map_or(String::new(), |limit| format!(", limit {limit:.3} {}", self.unit));
             format!(
-                "{}, limit {:.3} {}; it explains {:.0} % of the misfit and moves a parameter by {:.1} sigma",
+                "{}{limit}; it explains {:.0} % of the misfit and moves a parameter by {:.1} sigma",
                 self.words(),
-                self.limit.known().unwrap_or(f64::NAN),
-                self.unit,
                 100.0 * self.explained.known().unwrap_or(f64::NAN),
                 self.largest_shift.known().unwrap_or(f64::NAN),
             )

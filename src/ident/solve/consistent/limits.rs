@@ -13,7 +13,7 @@
 //!
 //! Without a prior the limits come from geometry and torque. The centre of mass is within a segment's length
 //! of the joint. The last segment counts as long as the longest known one, 1 m where none is known. Masses
-//! reach up to what ten times the measured torque could need, and fifty times as far without a length: a
+//! reach up to what ten times the measured torque could need, and ten times as far without a length: a
 //! short body needs more mass for the same moment. Rotor, friction and offset are limited as in the box of
 //! the base set ([`crate::ident::solve::bounds`]). A neutral leg replaces the prior: a twentieth of these
 //! limits, centres of mass at the joints. Its standard deviations equal its own size
@@ -37,7 +37,7 @@ const SMALLEST_SHAPE: f64 = 0.1;
 /// Length of a segment where the geometry gives none, m.
 const UNKNOWN_LENGTH_M: f64 = 1.0;
 /// Factor of a mass's limit where no length is known.
-const UNKNOWN_LENGTH_ROOM: f64 = 50.0;
+const UNKNOWN_LENGTH_ROOM: f64 = 10.0;
 /// Parameters of a neutral leg over the most that the torque could need.
 const NEUTRAL_SHARE: f64 = 0.05;
 /// Extent of a ball over its radius of gyration, 1 / sqrt(3).

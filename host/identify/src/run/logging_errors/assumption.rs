@@ -1,11 +1,11 @@
-//! Assumptions of the model that a recording may contradict as a whole: its clock, gravity, and what an angle
-//! is measured against.
+//! Assumptions of the model that a recording may contradict as a whole: its clock, weight, springs, and what
+//! an angle is measured against.
 //!
 //! ```text
 //! spring j          torque_j = Y_j p + k q_j     a spring beside the drive of joint j
 //! clock             Y(q, qd / f, qdd / f^2)      a second of the time column lasts f seconds
 //! no_gravity        Y without gravity            the torque holds no weight
-//! absolute_angle j  Y(q_j - q_(j - 1))           angle j against the base, not the link before it
+//! absolute_angle j  Y(q_j - sum_(i < j) (q_i - zero_i))    angle j against the base, not the link before it
 //! ```
 //!
 //! Each is fitted with the parameters eliminated. They run only after a refusal: a clock or a missing weight
@@ -38,7 +38,10 @@ pub(crate) struct Replaced<const B: usize> {
 }
 
 /// All assumptions, each replaced alone.
-pub(crate) fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Vec<Replaced<B>> {
+pub(crate) fn all<const N: usize, const B: usize>(
+    equations: &Equations<N, B>,
+    zero: &[f64; N],
+) -> Vec<Replaced<B>> {
     let weightless = RowModel { gravity: Vector3::zeros(), ..equations.model().clone() };
     let no_gravity = CauseReport {
         name: "no_gravity",
@@ -53,12 +56,12 @@ pub(crate) fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -
             name: "absolute_angle",
             joint: Some(joint + 1),
             words: format!(
-                "angle of joint {} is absolute, not against the link before it: subtract the angle of joint {joint}",
+                "angle of joint {} is absolute, not against the link before it: subtract the angles before it",
                 joint + 1
             ),
             ..CauseReport::default()
         };
-        replaced(equations, cause, equations.columns_of(equations.model(), &|instant| relative(instant, joint)))
+        replaced(equations, cause, equations.columns_of(equations.model(), &|instant| relative(instant, joint, zero)))
     }));
     found.extend((0..N).map(|joint| spring(equations, joint)));
     found.extend(clock(equations));
@@ -88,11 +91,13 @@ fn spring<const N: usize, const B: usize>(equations: &Equations<N, B>, joint: us
     with_torque(equations, cause, equations.columns.clone(), torque)
 }
 
-/// Makes an absolute angle relative to the joint before.
-fn relative<const N: usize>(instant: &mut Smoothed<f64, N>, joint: usize) {
-    instant.position[joint] -= instant.position[joint - 1];
-    instant.velocity[joint] -= instant.velocity[joint - 1];
-    instant.acceleration[joint] -= instant.acceleration[joint - 1];
+/// Makes the absolute angle of a joint relative to the link before it, for parallel axes.
+fn relative<const N: usize>(instant: &mut Smoothed<f64, N>, joint: usize, zero: &[f64; N]) {
+    for before in 0..joint {
+        instant.position[joint] -= instant.position[before] - zero[before];
+        instant.velocity[joint] -= instant.velocity[before];
+        instant.acceleration[joint] -= instant.acceleration[before];
+    }
 }
 
 /// The rate of the clock that fits best, unless it is the stated one.

@@ -8,10 +8,9 @@
 //!
 //! Ranking: findings about samples first, then the plausible correction that leaves least of the misfit.
 //! Where the uncorrected fit is not plausible, a correction must make it so. Otherwise the correction must
-//! halve the misfit's power, or be a direction that refuses. Whatever explains less than half of the misfit
-//! beyond noise is a symptom, and the cause is unknown; but a wrong sign may fit as well as the right one.
-//! Others that leave as much as the named one are listed beside it. Another leg is named only where a link's
-//! length or a zero is significant, and off by no more than its linear estimate can tell.
+//! halve the misfit's power, or be a direction that refuses. Another clock, no weight, a spring and absolute
+//! angles must explain half of the misfit in any case. Another leg is named only where a link's length or a
+//! zero is significant, and off by no more than its linear estimate can tell.
 
 use scarab::ident::Test;
 
@@ -32,16 +31,16 @@ const NEGATIVE_SIGMA: f64 = 5.0;
 const PLAUSIBLE_RATIO: f64 = 30.0;
 /// Part of the misfit that a correction may leave where the uncorrected fit is plausible.
 const HALVED: f64 = 0.7;
-/// Share of the misfit beyond noise that a correction must explain to be the cause.
+/// Share of the misfit from which an error is named although its size lies beyond the search.
+const BEYOND: f64 = 0.3;
+/// Part of the misfit's power that another assumption may leave.
 const HALF: f64 = 0.5;
-/// Share of the misfit from which a correction that is not the cause is mentioned.
-const SYMPTOM: f64 = 0.1;
+/// Significance of a direction that is named where no other cause is found.
+const WEAKER: f64 = 3.0;
 /// Misfits closer than this ratio count as equal: the simpler correction is named.
 const EQUAL: f64 = 1.1;
 /// Misfit over the torque up to which one correction may be all that is wrong.
 const SMALL_MISFIT: f64 = 0.2;
-/// Misfit over the torque that a good sensor's noise makes.
-const CLEAN_MISFIT: f64 = 0.04;
 /// Misfits closer than this ratio are those of mirrored legs.
 const MIRRORED: f64 = 1.001;
 
@@ -70,22 +69,6 @@ struct Tried {
     quality: Quality,
     /// Whether the same error of another joint cannot be distinguished.
     is_shared: bool,
-}
-
-impl Tried {
-    /// Share of the misfit's power that the correction explains.
-    fn explains(&self, here: Quality) -> f64 {
-        1.0 - (self.quality.remaining / here.remaining.max(1e-300)).powi(2)
-    }
-
-    /// Whether the correction makes a leg possible that was not, and leaves mostly noise; `systematic` is the
-    /// part of the present misfit that is none.
-    fn restores(&self, here: Quality, systematic: f64) -> bool {
-        let left = 1.0 - self.explains(here);
-        // The noise is that of the recorded unit, so a factor makes all of it systematic.
-        let is_noise = left - (1.0 - systematic) < HALF * left || self.quality.remaining < CLEAN_MISFIT;
-        !here.sound && is_noise && self.quality.remaining <= EQUAL * here.remaining
-    }
 }
 
 /// Names the most likely cause of a refusal.
@@ -119,31 +102,34 @@ pub(crate) fn likely<const N: usize, const B: usize>(
     // Before the delays, because a low-pass is tried only where it fits clearly better than a delay.
     let lags = lag::all(&errors.equations).into_iter().filter(|lag| lag.significance > CHANCE);
     tried.extend(lags.map(|lag| of_lag(question, errors, lag, here)));
-    let assumptions = assumption::all(&errors.equations);
-    tried.extend(assumptions.into_iter().map(|other| of_assumption(question, errors, other, here)));
     for (found, report) in errors.found.iter().zip(&errors.directions) {
-        let certain = found.significance() > CHANCE && !found.at_limit && (!report.passed || !here.sound);
+        let is_estimate = !found.at_limit || found.explained() > BEYOND;
+        let certain = found.significance() > CHANCE && is_estimate && (!report.passed || !here.sound);
         if certain {
             tried.push(of_direction(question, errors, found, report, here));
         }
     }
+    let assumptions = assumption::all(&errors.equations, &question.zero());
+    let assumptions = assumptions.into_iter().filter(|other| other.remaining < HALF);
+    tried.extend(assumptions.map(|other| of_assumption(question, errors, other, here)));
     let midway = errors.midway.as_ref().filter(|midway| midway.refuses());
     tried.extend(midway.map(|midway| changed_midway(midway, here)));
     tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
-    let needed = HALF * errors.systematic;
     let refused: Vec<bool> = tried.iter().map(|tried| is_refusing(errors, &tried.cause)).collect();
     let passing = tried.into_iter().zip(refused).filter(|(tried, refused)| {
         tried.quality.sound && (!here.sound || *refused || tried.quality.remaining < HALVED * here.remaining)
     });
-    let (best, lesser): (Vec<Tried>, Vec<Tried>) = passing
-        .map(|(tried, _)| tried)
-        .partition(|tried| tried.explains(here) >= needed || tried.restores(here, errors.systematic));
-    let best = nearest(best);
+    let best = nearest(passing.map(|(tried, _)| tried).collect());
     let geometry = findings.iter().find(|finding| {
-        !finding.passed && finding.value.known().is_some_and(|value| is_small(finding.test, value))
+        let tests = [Test::LinkLength, Test::EncoderZero];
+        !finding.passed && tests.iter().any(|test| test.name() == finding.test)
     });
+    let is_estimate =
+        |finding: &&FindingReport| finding.value.known().is_some_and(|value| is_small(finding.test, value));
     match (best, geometry) {
         (Some(best), _) => best,
+        // Whatever looks like a large error of geometry is none that is known.
+        (None, Some(finding)) if !is_estimate(&finding) => excluded(samples).unwrap_or_else(unknown),
         (None, Some(finding)) => CauseReport {
             name: "other_leg",
             joint: finding.joint,
@@ -151,7 +137,7 @@ pub(crate) fn likely<const N: usize, const B: usize>(
             words: finding.words.clone(),
             ..CauseReport::default()
         },
-        (None, None) => excluded(samples).unwrap_or_else(|| undecided(lesser, here)),
+        (None, None) => weaker(question, errors, here).or_else(|| excluded(samples)).unwrap_or_else(unknown),
     }
 }
 
@@ -237,8 +223,6 @@ fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
     let least = passing.iter().map(|tried| tried.quality.remaining).fold(f64::INFINITY, f64::min);
     passing.retain(|tried| tried.quality.remaining <= EQUAL * least);
     let name = passing.first()?.cause.name;
-    let mut others: Vec<&str> = passing.iter().map(|tried| tried.cause.name).collect();
-    others.dedup();
     passing.retain(|tried| tried.cause.name == name);
     passing.sort_by(|one, other| one.quality.remaining.total_cmp(&other.quality.remaining));
     let mut all = passing.into_iter();
@@ -253,11 +237,23 @@ fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
     if best.is_shared {
         best.cause.joint = None;
     }
-    others.retain(|other| *other != name);
-    if !others.is_empty() {
-        best.cause.words += &format!("; not told apart from: {}", others.join(", ").replace('_', " "));
-    }
     Some(best.cause)
+}
+
+/// Direction that is not significant enough to refuse by itself, named after another refusal.
+fn weaker<const N: usize, const B: usize>(
+    question: &Question<N, B>,
+    errors: &LoggingErrors<N, B>,
+    here: Quality,
+) -> Option<CauseReport> {
+    let pairs = errors.found.iter().zip(&errors.directions);
+    let likely = pairs.filter(|(found, report)| {
+        found.significance() > WEAKER
+            && !found.at_limit
+            && found.explained() > 0.3 * report.explained_limit.known().unwrap_or(1.0)
+    });
+    let tried = likely.map(|(found, report)| of_direction(question, errors, found, report, here));
+    nearest(tried.filter(|tried| tried.quality.sound).collect())
 }
 
 /// Saturated stretches whose exclusion leaves too little to judge.
@@ -265,26 +261,14 @@ fn excluded(samples: &[SampleFinding]) -> Option<CauseReport> {
     samples.iter().find(|finding| finding.name == SATURATION).map(sample_cause)
 }
 
-/// No cause, with the correction that explains most of the misfit, if one helps at all.
-fn undecided(mut tried: Vec<Tried>, here: Quality) -> CauseReport {
-    tried.sort_by(|one, other| one.quality.remaining.total_cmp(&other.quality.remaining));
-    let best = tried.first().filter(|best| best.explains(here) > SYMPTOM);
-    let symptom = best.map_or(String::new(), |best| {
-        let (name, share) = (best.cause.name.replace('_', " "), 100.0 * best.explains(here));
-        format!("; `{name}` explains {share:.0} % and may be a symptom")
-    });
+fn unknown() -> CauseReport {
     CauseReport {
         name: "unknown",
-        words: format!(
-            "no correction of units and no single one of signs, columns, drives, clock, delay, scale or gravity explains half of \
-             the misfit{symptom}"
-        ),
+        words: "no correction of units and no single one of signs, columns, delay, scale or gravity makes the recording \
+                acceptable"
+            .into(),
         ..CauseReport::default()
     }
-}
-
-fn unknown() -> CauseReport {
-    undecided(Vec::new(), Quality { remaining: 1.0, sound: true })
 }
 
 fn is_refusing<const N: usize, const B: usize>(errors: &LoggingErrors<N, B>, cause: &CauseReport) -> bool {

@@ -167,9 +167,7 @@ impl<const B: usize> Found<B> {
         if !self.seen {
             return 0.0;
         }
-        let (without, with) = self.cost;
-        let gain = (without * (without - with).max(0.0) / with.max(1e-300)).sqrt();
-        (self.value.abs() / self.sigma()).min(gain * self.noise_sigma / self.sigma())
+        (self.value.abs() / self.sigma()).min(gain(self.cost) * self.noise_sigma / self.sigma())
     }
 
     /// Share of the misfit that the direction explains.
@@ -183,6 +181,12 @@ impl<const B: usize> Found<B> {
         let certain = (1.0 - (2.0 / self.significance().max(1e-9)).powi(2)).max(0.0);
         self.shift.map(|shift| shift * shift * certain)
     }
+}
+
+/// Standard deviations of noise that a fall of the cost from `without` to `with` is worth. The cost counts in
+/// the misfit that remains.
+fn gain((without, with): (f64, f64)) -> f64 {
+    (without * (without - with).max(0.0) / with.max(1e-300)).sqrt()
 }
 
 /// Joint's zero in chain angles, and its torques.
@@ -202,6 +206,13 @@ struct Solved<'a, const B: usize> {
     system: System<'a, B>,
     fit: Fit<B>,
     score: Score,
+}
+
+impl<const B: usize> Solved<'_, B> {
+    /// Whether a further step would be lost in the noise, or the motion does not show the direction.
+    fn is_settled(&self) -> bool {
+        self.score.seen < SEEN_SHARE || self.score.delta.abs() < 0.05 * self.score.noise_sigma
+    }
 }
 
 type System<'a, const B: usize> = (Cow<'a, [[f64; B]]>, Cow<'a, [f64]>);
@@ -342,47 +353,53 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
         }
     }
 
-    /// Gauss-Newton from a start.
+    /// Gauss-Newton from a start. A step that costs more is halved.
     fn solved(&self, kind: Kind, start: f64) -> Solved<'a, B> {
         let (largest, step) = kind.range();
         let largest = match kind {
             Kind::Delay(_) => self.equations.largest_delay_s(),
             _ => largest,
         };
-        let mut value = start;
-        let mut at_limit = false;
-        let mut system = self.system(kind, value);
-        let mut fit = self.equations.fit(&system.0, &system.1, false);
-        let mut score = self.score(kind, value, &system, &fit);
+        let mut here = self.at(kind, start);
+        let mut share = 1.0;
         for _ in 0..STEPS {
-            if score.seen < SEEN_SHARE || score.delta.abs() < 0.05 * score.noise_sigma {
-                break;
+            if here.is_settled() {
+                return here;
             }
-            let next = (value + score.delta.clamp(-step, step)).clamp(-largest, largest);
-            at_limit = next.abs() == largest || (kind.joint().is_some() && next <= LEAST_SCALE);
-            if kind.joint().is_some() && next <= LEAST_SCALE {
-                break;
+            let least = if kind.joint().is_some() { LEAST_SCALE.max(-largest) } else { -largest };
+            let wanted = (here.value + share * here.score.delta.clamp(-step, step)).clamp(least, largest);
+            let next = self.at(kind, wanted);
+            if next.fit.cost <= here.fit.cost {
+                let at_limit = wanted == least || wanted == largest;
+                here = Solved { at_limit, ..next };
+                share = 1.0;
+            } else {
+                share *= 0.25;
             }
-            value = next;
-            system = self.system(kind, value);
-            fit = self.equations.fit(&system.0, &system.1, false);
-            score = self.score(kind, value, &system, &fit);
         }
-        if kind == Kind::Gravity {
-            value = (value + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
-        }
-        Solved { value, at_limit, system, fit, score }
+        // A search that is still far from its end found nothing.
+        here.at_limit |= here.score.delta.abs() > here.score.sigma();
+        here
+    }
+
+    fn at(&self, kind: Kind, value: f64) -> Solved<'a, B> {
+        let system = self.system(kind, value);
+        let fit = self.equations.fit(&system.0, &system.1, false);
+        let score = self.score(kind, value, &system, &fit);
+        Solved { value, at_limit: false, system, fit, score }
     }
 
     fn one(&self, kind: Kind, plain: &Fit<B>, training: &Fit<B>) -> Found<B> {
         let near = self.solved(kind, 0.0);
         let far = self.scanned(kind, plain).map(|start| self.solved(kind, start));
-        let scatter = (near.score.sigma() / near.score.noise_sigma).powi(2);
-        let earned = |far: &Solved<'_, B>| near.fit.cost - far.fit.cost > CHANCE * CHANCE * scatter;
-        let Solved { value, at_limit, system, fit, score } = match far {
+        let earned = |far: &Solved<'_, B>| gain((near.fit.cost, far.fit.cost)) > CHANCE;
+        let Solved { mut value, at_limit, system, fit, score } = match far {
             Some(far) if earned(&far) => far,
             _ => near,
         };
+        if kind == Kind::Gravity {
+            value = (value + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+        }
         let seen = score.seen >= SEEN_SHARE && score.sigma().is_finite();
         // The weights are those of the misfit without the direction.
         let remaining = if plain.cost > 0.0 { (fit.cost / plain.cost).min(1.0).sqrt() } else { 1.0 };

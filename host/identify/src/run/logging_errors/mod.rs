@@ -11,7 +11,7 @@
 //! | [`fit`] | least squares, a further column beside it, both standard deviations |
 //! | [`directions`] | delay, encoder scale, torque scale, gravity |
 //! | [`lag`] | low-pass or delay of the torque as a cause |
-//! | [`assumption`] | another clock, no weight, absolute angles as a cause |
+//! | [`assumption`] | another clock, no weight, a spring, absolute angles as a cause |
 //! | [`midway`] | gain or sign of the torque that changes midway |
 //! | [`encoder`] | bias by the steps of an encoder |
 //! | [`noise`] | noise of the torque at the recording's own rate |
@@ -152,8 +152,6 @@ pub(crate) struct LoggingErrors<const N: usize, const B: usize> {
     pub(crate) sigma: [Sigma; B],
     /// Effect of the encoders' steps; `None` where they are negligible.
     pub(crate) encoder: Option<Bias<N, B>>,
-    /// Part of the misfit's power that is not noise, 0..1; one where the noise is unknown.
-    pub(crate) systematic: f64,
     /// Bandwidth at which the steps are negligible, Hz; only where they refuse.
     better_hz: Option<f64>,
 }
@@ -235,17 +233,7 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
             }
         }
         let midway = midway::find(&equations);
-        Ok(Some(Self {
-            equations,
-            found,
-            directions,
-            midway,
-            misfit_over_noise,
-            sigma,
-            encoder,
-            systematic,
-            better_hz,
-        }))
+        Ok(Some(Self { equations, found, directions, midway, misfit_over_noise, sigma, encoder, better_hz }))
     }
 
     /// Findings for the verdict.

@@ -224,26 +224,12 @@ fn gravity_of_a_leg_with_weak_coupling_is_not_turned_over() {
 }
 
 #[test]
-fn what_explains_less_than_half_of_the_misfit_is_a_symptom() {
-    // Friction by load, which no correction describes.
-    let mut motion = motion([0.0; 2], 1);
-    for (sample, torques) in motion.torque.iter_mut().enumerate() {
-        let velocity = instant(sample as f64 / 500.0).velocity;
-        let loaded = |joint: usize| torques[joint] + 0.2 * torques[joint].abs() * velocity[joint].signum();
-        *torques = [loaded(0), loaded(1)];
-    }
-    let cause = cause_of(&question(vec![motion]));
-    assert_eq!(cause.name, "unknown", "{}", cause.words);
-    assert!(cause.value.known().is_none() && cause.sigma.known().is_none());
-}
-
-#[test]
 fn an_estimate_at_the_end_of_its_search_is_not_determined() {
     let question = question(vec![motion([0.0, 0.25], 1)]);
     let found = errors(&question);
     let ended = found.directions.iter().find(|one| one.at_limit).expect("a search that ends at its limit");
     assert!(ended.value.known().is_none() && ended.words().contains("not determined"), "{}", ended.words());
-    assert_ne!(cause_of(&question).name, ended.name);
+    assert!(cause_of(&question).value.known().is_none());
 }
 
 #[test]
