@@ -167,7 +167,8 @@ impl<const B: usize> Found<B> {
         if !self.seen {
             return 0.0;
         }
-        (self.value.abs() / self.sigma()).min(gain(self.cost) * self.noise_sigma / self.sigma())
+        let (plain, with) = self.cost;
+        (self.value.abs() / self.sigma()).min(gain(plain, plain, with) * self.noise_sigma / self.sigma())
     }
 
     /// Share of the misfit that the direction explains.
@@ -183,10 +184,10 @@ impl<const B: usize> Found<B> {
     }
 }
 
-/// Standard deviations of noise that a fall of the cost from `without` to `with` is worth. The cost counts in
-/// the misfit that remains.
-fn gain((without, with): (f64, f64)) -> f64 {
-    (without * (without - with).max(0.0) / with.max(1e-300)).sqrt()
+/// Standard deviations that a fall of the cost from `without` to `with` is worth. The weights are those of the
+/// `plain` misfit, whose cost is the number of rows; the fall counts in the misfit that remains.
+fn gain(plain: f64, without: f64, with: f64) -> f64 {
+    (plain * (without - with).max(0.0) / with.max(1e-300)).sqrt()
 }
 
 /// Joint's zero in chain angles, and its torques.
@@ -392,7 +393,10 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     fn one(&self, kind: Kind, plain: &Fit<B>, training: &Fit<B>) -> Found<B> {
         let near = self.solved(kind, 0.0);
         let far = self.scanned(kind, plain).map(|start| self.solved(kind, start));
-        let earned = |far: &Solved<'_, B>| gain((near.fit.cost, far.fit.cost)) > CHANCE;
+        let earned = |far: &Solved<'_, B>| {
+            gain(plain.cost, near.fit.cost, far.fit.cost) > CHANCE
+                && far.fit.cost < (1.0 - EXPLAINED_SHARE) * near.fit.cost
+        };
         let Solved { mut value, at_limit, system, fit, score } = match far {
             Some(far) if earned(&far) => far,
             _ => near,
