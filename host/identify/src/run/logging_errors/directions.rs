@@ -184,8 +184,8 @@ impl<const B: usize> Found<B> {
     }
 }
 
-/// Standard deviations that a fall of the cost from `without` to `with` is worth. The weights are those of the
-/// `plain` misfit, whose cost is the number of rows; the fall counts in the misfit that remains.
+/// Standard deviations that a fall of the cost from `without` to `with` is worth. The weights are those of
+/// the `plain` misfit, whose cost is the number of rows; the fall counts in the misfit that remains.
 fn gain(plain: f64, without: f64, with: f64) -> f64 {
     (plain * (without - with).max(0.0) / with.max(1e-300)).sqrt()
 }
