@@ -127,6 +127,7 @@ class Leg:
         validate: _Triple | Sequence[_Triple] | None = None,
         split: float | None = None,
         bandwidth_hz: float | Literal["auto"] | None = None,
+        accept_error_percent: float | None = None,
         plan: Literal["one-time", "sequential"] = "one-time",
         prior: str | None = None,
         estimator: Literal["robust", "plain"] = "robust",
@@ -143,8 +144,9 @@ class Leg:
         `t`: (samples,), strictly increasing, 10 Hz or faster; `q` and `tau`: (samples, joints). A message about
         `recording:17` concerns sample 17. `also`: more training recordings (t, q, tau). `validate`: held-out
         recordings; `split`: share of each recording that trains. Without either, the result is not validated.
-        `bandwidth_hz`: -3 dB frequency of the low-pass, default that of the leg file (8 Hz). `prior`: 'none',
-        'file' or 'wrong:PERCENT'. `torque_delay_ms`: delay to be removed, one value or one for each joint.
+        `bandwidth_hz`: -3 dB frequency of the low-pass, default that of the leg file (8 Hz).
+        `accept_error_percent`: error accepted beside noise, percent of the rms torque, default that of the leg
+        file (5). `prior`: 'none', 'file' or 'wrong:PERCENT'. `torque_delay_ms`: delay to be removed, one value or one for each joint.
         `load`, `payload`: known mass as 'KG@JOINT:X_M', see `cargo sim replay --help`.
         A recording that cannot be identified from still gives a result, whose verdict refuses it with reasons.
         """

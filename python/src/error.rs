@@ -21,6 +21,7 @@ create_exception!(
 const ARGUMENTS: [(&str, &str); 7] = [
     ("--torque-delay", "torque_delay_ms"),
     ("--bandwidth", "bandwidth_hz"),
+    ("--accept-error", "accept_error_percent"),
     ("--duration", "duration_s"),
     ("--torque-margin", "torque_margin_percent"),
     ("--torque-noise-nm", "torque_noise_percent"),

@@ -221,8 +221,8 @@ impl Leg {
 
     #[doc = include_str!(concat!(env!("OUT_DIR"), "/Leg.identify"))]
     #[pyo3(signature = (
-        t, q, tau, *, also = None, validate = None, split = None, bandwidth_hz = None, plan = "one-time",
-        prior = None, estimator = "robust", seed = 1, torque_delay_ms = None, even_stamps = false,
+        t, q, tau, *, also = None, validate = None, split = None, bandwidth_hz = None, accept_error_percent = None,
+        plan = "one-time", prior = None, estimator = "robust", seed = 1, torque_delay_ms = None, even_stamps = false,
         load = None, payload = None, with_payload = None, temperature_c = None
     ))]
     fn identify<'py>(
@@ -235,6 +235,7 @@ impl Leg {
         validate: Option<Bound<'py, PyAny>>,
         split: Option<f64>,
         bandwidth_hz: Option<Bandwidth>,
+        accept_error_percent: Option<f64>,
         plan: &str,
         prior: Option<&str>,
         estimator: &str,
@@ -261,6 +262,7 @@ impl Leg {
             split,
             bandwidth_hz: hertz.flatten().unwrap_or(leg.bandwidth_hz),
             chooses_bandwidth: hertz == Some(None),
+            accept_error_percent: accept_error_percent.unwrap_or(leg.accept_error_percent),
             plan: named("plan", plan, &plans)?,
             prior: prior
                 .map_or(Ok(PriorChoice::Default), str::parse)

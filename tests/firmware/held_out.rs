@@ -139,7 +139,7 @@ fn the_duration_of_a_disturbance_of_both_joints_is_measured() {
 #[test]
 fn only_an_unmodelled_swing_counts_as_slow_residual() {
     let by_chance = |joint: usize, found: &Found| {
-        f64::from(found.residual.joints[joint].slow_by_chance(5.2, Some(NOISE_NM[joint] as f32)))
+        f64::from(found.residual.joints[joint].slow_by_chance(5.2, NOISE_NM[joint] as f32, true))
     };
     for seed in 0..10 {
         let quiet = evaluate(LENGTH_M, [0.0; 2], NOISE_NM, seed, |_| 0.0);

@@ -39,13 +39,12 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         // The values before the completion: a computed torque has no inertia or friction in them.
         thresholds.judge_measurement(model, record, &self.search().values(), builder);
         thresholds.judge_residual(record, &found, builder);
-        let noise_is_known = record.noise.iter().all(|&noise| noise > T::zero());
         let mut predicted = false;
         for (motion, unused) in unused.enumerate() {
             predicted = true;
             thresholds.judge_excluded(&unused.record.outliers, Some(motion), builder);
             thresholds.judge_validation(record, motion, unused.record, &estimate, builder);
-            thresholds.judge_colour(motion, &unused, builder);
+            thresholds.judge_colour(record, motion, &unused, &estimate, builder);
             thresholds.judge_contact(motion, &unused, builder);
         }
         if !predicted {
@@ -54,7 +53,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         if !builder.verdict().has(Reason::Validation) {
             // Pushes and a wrong mass ask for changes that are not geometry errors.
             for found in misalignments.iter().flatten() {
-                thresholds.judge_alignment(found, noise_is_known, builder);
+                thresholds.judge_alignment(found, builder);
             }
         }
         builder.verdict()

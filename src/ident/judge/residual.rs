@@ -105,15 +105,11 @@ impl<T: Real> JointResidual<T> {
     }
 
     /// Limit of [`Self::slow`] for noise alone, at a quantile of the standard normal distribution. `noise` is
-    /// the standard deviation of a 500 Hz sample. Without it no disturbance is forgiven and the limit follows
-    /// from the blocks' own scatter; with fewer than `quantile^2` pairs the result is then meaningless.
-    pub fn slow_by_chance(&self, quantile: T, noise: Option<T>) -> T {
-        let judged = self.judged(noise.is_some());
+    /// the standard deviation of a 500 Hz sample.
+    pub fn slow_by_chance(&self, quantile: T, noise: T, forgiven: bool) -> T {
+        let judged = self.judged(forgiven);
         let pairs = T::from_double(f64::from(judged.pairs.max(1)));
-        let variance = match noise {
-            Some(noise) => noise * noise / T::from_double(f64::from(LEAST_FILLED) * DECIMATION as f64),
-            None => judged.squares / pairs,
-        };
+        let variance = noise * noise / T::from_double(f64::from(LEAST_FILLED) * DECIMATION as f64);
         real::sqrt(quantile * variance / real::sqrt(pairs))
     }
 

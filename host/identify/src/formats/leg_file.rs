@@ -8,6 +8,7 @@
 //! | `name` | | required |
 //! | `gravity` | m/s^2, base frame | required |
 //! | `torque_noise_percent` | white noise in percent of mean absolute torque, see below | 0 |
+//! | `accept_error_percent` | error of a held-out torque accepted beside noise, percent of its rms | 5 |
 //! | `bandwidth_hz` | -3 dB frequency of the identification's low-pass | 8 |
 //! | `pushes` | `{ per_minute, torque_nm, duration_s }`: random pushes by the wearer | none |
 //! | `temperature_c` | temperature of the drives, degrees Celsius, if known | none |
@@ -94,6 +95,9 @@ pub struct LegFile {
     /// Frequency at which the low-pass of the identification is 3 dB down, Hz.
     #[serde(default = "default_bandwidth")]
     pub bandwidth_hz: f64,
+    /// Error of a held-out torque that a replay accepts beside noise, percent of its root mean square.
+    #[serde(default = "default_accept_error")]
+    pub accept_error_percent: f64,
     /// The wearer's pushes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pushes: Option<PushesFile>,
@@ -344,6 +348,7 @@ pub(crate) use defaults;
 
 defaults! {
     default_bandwidth: f64 = 8.0;
+    default_accept_error: f64 = 5.0;
     default_direction: i64 = 1;
     default_range: [f64; 2] = DEFAULT_RANGE_DEG;
     default_speed_limit: f64 = DEFAULT_SPEED_LIMIT;

@@ -27,6 +27,7 @@ use scarab_base::toml_file::{self, Fault, Step};
 use serde::{Deserialize, Serialize};
 
 use crate::formats::leg_file::{BodySide, DhFile, JointFile, LegFile};
+use crate::report::{ACCEPTED, ACCEPTED_WITH_MISFIT};
 
 /// Version of the keys.
 pub(crate) const MODEL_SCHEMA: i64 = 1;
@@ -266,7 +267,7 @@ impl ModelFile {
                 model.checksum
             )));
         }
-        if model.conditions.verdict != "accepted" {
+        if ![ACCEPTED, ACCEPTED_WITH_MISFIT].contains(&model.conditions.verdict.as_str()) {
             return Err(ToolError::Refused(format!("{file}: this model was never accepted")));
         }
         Ok(model)

@@ -14,6 +14,8 @@ pub struct DoubtReport {
     pub(crate) directions: Vec<DirectionReport>,
     /// Root mean square misfit of the filtered torque over its noise, for each joint.
     pub(crate) misfit_over_noise: Vec<Number>,
+    /// Error accepted beside noise, percent of the rms torque.
+    pub(crate) accept_error_percent: f64,
     /// Parameters that end at a limit of the prior.
     pub(crate) at_prior_limit: Vec<String>,
     /// Scatter between the recordings identified from.
@@ -130,7 +132,8 @@ pub(crate) enum ReadAs {
 /// One direction: an error of the logging chain with its estimate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct DirectionReport {
-    /// `delay`, `encoder_scale`, `torque_scale`, `gravity`.
+    /// `delay`, `encoder_scale`, `torque_scale`, `gravity`, `spring`, `offset_drift`, `torque_drift`,
+    /// `friction_drift`.
     pub(crate) name: &'static str,
     /// Joint, from 1; `null` for gravity.
     pub(crate) joint: Option<usize>,
@@ -142,7 +145,7 @@ pub(crate) struct DirectionReport {
     pub(crate) sigma: Number,
     /// Source of the standard deviation: `noise` or `segments`.
     pub(crate) sigma_from: &'static str,
-    /// `ms`, `%` or `deg`.
+    /// `ms`, `%`, `deg`, `N m/rad` or `N m`.
     pub(crate) unit: &'static str,
     /// Largest magnitude that chance explains.
     pub(crate) limit: Number,
@@ -205,6 +208,16 @@ impl DirectionReport {
                 "torque of joint {joint}: {size} % too {} against joint 1",
                 if negative { "small" } else { "large" }
             ),
+            "spring" => format!(
+                "torque of joint {joint} {} with its angle by {size} N m/rad, as of a spring beside the drive",
+                if negative { "falls" } else { "grows" }
+            ),
+            "offset_drift" | "torque_drift" | "friction_drift" => format!(
+                "{} of joint {joint} {} by {size} {} over each recording",
+                self.name.trim_end_matches("_drift"),
+                if negative { "falls" } else { "grows" },
+                self.unit
+            ),
             _ => format!("gravity: turned by {}{size} degrees", if negative { "-" } else { "" }),
         }
     }
@@ -223,6 +236,13 @@ impl DirectionReport {
             names => format!(" (not distinguished from {})", names.join(", ").replace('_', " ")),
         };
         format!("{}{alike}", self.words())
+    }
+
+    /// Whether the report has a line about it: springs and drifts only where they are more than chance.
+    fn is_shown(&self) -> bool {
+        let is_rare = self.name == "spring" || self.name.ends_with("_drift");
+        let beyond = |value: f64| self.limit.known().is_some_and(|limit| value.abs() > limit);
+        !is_rare || !self.passed || self.value.known().is_some_and(beyond)
     }
 
     /// Test of the verdict.
@@ -270,9 +290,13 @@ impl DoubtReport {
             .filter_map(|(joint, ratio)| Some(format!("joint {}: {:.2}", joint + 1, ratio.known()?)))
             .collect();
         if !ratios.is_empty() {
-            lines.push(format!("misfit over noise: {}", ratios.join("; ")));
+            lines.push(format!(
+                "misfit over noise: {}; beside noise, an error of {} % of the rms torque is accepted (--accept-error)",
+                ratios.join("; "),
+                self.accept_error_percent
+            ));
         }
-        lines.extend(self.directions.iter().map(DirectionReport::line));
+        lines.extend(self.directions.iter().filter(|found| found.is_shown()).map(DirectionReport::line));
         lines.push(self.recordings.line());
         if !self.at_prior_limit.is_empty() {
             lines.push(format!("at a limit of the prior: {}", self.at_prior_limit.join(", ")));

@@ -30,6 +30,17 @@ use crate::report::trace::TraceReport;
 
 /// Version of the JSON.
 pub const SCHEMA: u32 = 1;
+/// Verdict: every test passed.
+pub const ACCEPTED: Word = "accepted";
+/// Verdict: every test passed, but noise does not explain the misfit of the recording.
+pub const ACCEPTED_WITH_MISFIT: Word = "accepted_with_misfit";
+/// Verdict: a test failed.
+pub const REFUSED: Word = "refused";
+
+/// Misfit over noise up to which noise explains the misfit, so that limits follow from the noise.
+pub(crate) const EXPLAINED_BY_NOISE: f64 = 1.3;
+/// Error of a torque, percent of its rms, that counts as none: exact data keep the filter's and the clock's.
+const NEGLIGIBLE_PERCENT: f64 = 0.5;
 
 /// One of a joint's fourteen parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -286,7 +297,7 @@ pub struct RunReport {
     /// `one-time` or `sequential`.
     #[serde(deserialize_with = "word")]
     pub plan: Word,
-    /// `accepted` or `refused`.
+    /// [`ACCEPTED`], [`ACCEPTED_WITH_MISFIT`] or [`REFUSED`].
     #[serde(deserialize_with = "word")]
     pub verdict: Word,
     /// Whether unused motions were predicted; if not, `accepted` refers to the training motion.
@@ -386,6 +397,24 @@ impl RunReport {
     /// Whether the result was accepted: exit code 0.
     pub fn accepted(&self) -> bool {
         self.reasons.is_empty()
+    }
+
+    /// Largest misfit over noise of a result that is accepted although noise does not explain it.
+    pub fn accepted_misfit(&self) -> Option<f64> {
+        (self.verdict == ACCEPTED_WITH_MISFIT).then(|| self.unexplained_misfit())?
+    }
+
+    /// Largest misfit over noise that noise does not explain, of a joint whose error is not negligible.
+    pub(crate) fn unexplained_misfit(&self) -> Option<f64> {
+        let ratios = &self.doubt.as_ref()?.misfit_over_noise;
+        let is_negligible = |joint: usize| {
+            let fits = self.training.iter().chain(&self.validation).filter(|fit| fit.joint == joint + 1);
+            fits.filter_map(|fit| fit.percent_of_rms.known()).all(|error| error <= NEGLIGIBLE_PERCENT)
+        };
+        let unexplained = ratios.iter().enumerate().filter_map(|(joint, ratio)| {
+            ratio.known().filter(|ratio| *ratio > EXPLAINED_BY_NOISE && !is_negligible(joint))
+        });
+        unexplained.reduce(f64::max)
     }
 }
 

@@ -18,8 +18,8 @@ use crate::report::findings::FindingReport;
 use crate::report::scale::ScaleReport;
 use crate::report::trace::TraceReport;
 use crate::report::{
-    BaseReport, ConsistentReport, FitReport, LeastSquaresReport, ParameterReport, RunReport, SCHEMA,
-    SwarmReport, TrackingReport,
+    ACCEPTED, BaseReport, ConsistentReport, FitReport, LeastSquaresReport, ParameterReport, REFUSED,
+    RunReport, SCHEMA, SwarmReport, TrackingReport,
 };
 use crate::run::consistent;
 
@@ -254,7 +254,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             swarm_seed: outcome.bso.seed,
             prior: self.prior_name.clone(),
             plan: outcome.plan,
-            verdict: if outcome.reasons.is_empty() { "accepted" } else { "refused" },
+            verdict: if outcome.reasons.is_empty() { ACCEPTED } else { REFUSED },
             validated: !outcome.validation.is_empty(),
             reasons: outcome.reasons,
             findings: outcome.findings,

@@ -65,6 +65,8 @@ pub struct ReplayOptions {
     pub plan: Plan,
     /// Prior for the search box.
     pub prior: PriorChoice,
+    /// Error accepted beside noise, percent of the rms torque.
+    pub accept_error_percent: f64,
     /// Estimator; only the robust one excludes disturbances and searches Stribeck friction.
     pub estimator: Estimator,
     /// Seed of the swarm.
@@ -92,6 +94,7 @@ impl ReplayOptions {
             chooses_bandwidth: false,
             plan: Plan::OneTime,
             prior: PriorChoice::Default,
+            accept_error_percent: leg.accept_error_percent,
             estimator: Estimator::Robust,
             swarm_seed: DEFAULT_SEED,
             csv: None,
@@ -109,6 +112,9 @@ impl ReplayOptions {
         let refused = |reason: &str| Err(ToolError::input(reason));
         if self.split.is_some_and(|share| !(share > 0.0 && share < 1.0)) {
             return refused("--split: must be above 0 and below 1");
+        }
+        if !(0.0..=100.0).contains(&self.accept_error_percent) {
+            return refused("--accept-error: must be 0 to 100 percent of the rms torque");
         }
         if self.split.is_some() && !held_out.is_empty() {
             return refused("--split and --validate exclude each other");
@@ -195,7 +201,8 @@ fn identified<const N: usize, const B: usize>(
     let mut warnings = doubts(leg, &parts, training.iter().chain(&held_out));
 
     let mut solved = solve(&mut background, recorder, &training, &noise[0], options, scale);
-    let judged = judge(&background, &mut solved, &held_out, &noise[1]);
+    let accepted_error = options.accept_error_percent / 100.0;
+    let judged = judge(&background, &mut solved, &held_out, &noise[1], accepted_error);
     if let Some(path) = &options.csv {
         write_predictions(path, &judged.predictions, &anatomy)?;
     }
@@ -204,7 +211,7 @@ fn identified<const N: usize, const B: usize>(
     let mut run = report(&background, &solved, judged, options, simulated_s);
 
     let [proposed_hz, stribeck_hz] =
-        bandwidths(leg, &background, &encoders, recordings, options, solved.noise_is_known)?;
+        bandwidths(leg, &background, &encoders, recordings, options, solved.is_explained)?;
     let subject = Subject {
         leg,
         background: &background,
@@ -275,7 +282,7 @@ fn bandwidths<const N: usize, const B: usize>(
     encoders: &Encoders<N>,
     recordings: &Recordings,
     options: &ReplayOptions,
-    noise_is_known: bool,
+    is_explained: bool,
 ) -> Result<[Option<f64>; 2], ToolError> {
     let searches_stribeck = |hz: f64| {
         let mut model = background.model.clone();
@@ -290,7 +297,7 @@ fn bandwidths<const N: usize, const B: usize>(
     };
     let present = options.bandwidth_hz;
     let mut proposed = None;
-    if noise_is_known && !options.chooses_bandwidth {
+    if is_explained && !options.chooses_bandwidth {
         let larger = chosen_bandwidth(leg, background, recordings, options)?;
         proposed = largest(larger).filter(|hz| *hz > present);
     }

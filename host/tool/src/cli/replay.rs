@@ -41,6 +41,10 @@ pub(crate) struct ReplayArguments {
     /// 8. `auto`: the largest up to 16 Hz at which the encoders' steps are negligible.
     #[arg(long, value_name = "HZ|auto", allow_negative_numbers = true, help_heading = "Identification")]
     bandwidth: Option<Bandwidth>,
+    /// Error of a held-out torque that is accepted beside noise, percent of its rms, 0 to 100. Default: that
+    /// of the leg file, else 5.
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, help_heading = "Identification")]
+    accept_error: Option<f64>,
     /// Remove this delay of the torque against the angle, ms: one value, or one for each joint, by comma.
     #[arg(
         long,
@@ -105,6 +109,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         chooses_bandwidth: arguments.bandwidth == Some(Bandwidth::Auto),
         plan: arguments.common.plan,
         prior: arguments.common.prior.unwrap_or_default(),
+        accept_error_percent: arguments.accept_error.unwrap_or(leg.accept_error_percent),
         estimator: arguments.common.estimator,
         swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),
         csv: arguments.csv.as_deref().map(Path::to_owned),

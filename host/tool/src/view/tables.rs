@@ -390,8 +390,11 @@ pub fn verdict_line(run: &RunReport) -> String {
         String::new()
     };
     if run.accepted() {
+        let misfit = run
+            .accepted_misfit()
+            .map_or(String::new(), |ratio| format!(", with a misfit of {ratio:.1} times the noise"));
         let validated = if run.validated { "" } else { ", not validated" };
-        format!("verdict: accepted{validated}{seconds}")
+        format!("verdict: accepted{misfit}{validated}{seconds}")
     } else {
         format!("verdict: refused, {}{seconds}", run.reasons.join(", "))
     }

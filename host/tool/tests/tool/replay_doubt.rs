@@ -418,3 +418,70 @@ fn a_real_arm_with_misfit_far_above_its_noise_is_accepted() {
     let scale = direction(&report, "torque_scale", 2);
     assert!(number(&scale["value"]) > 5.0 && scale["passed"] == true, "{scale}");
 }
+
+/// Recording with a torque added at the first joint: by the share of the recording, and the row.
+fn added(torque: impl Fn(f64, &[f64; 5]) -> f64) -> Vec<[f64; 5]> {
+    let mut samples = samples();
+    let count = samples.len() as f64;
+    for (index, row) in samples.iter_mut().enumerate() {
+        row[3] += torque(index as f64 / count, row);
+    }
+    samples
+}
+
+#[test]
+fn a_misfit_within_the_accepted_error_is_a_verdict_of_its_own() {
+    let vibrating = |size: f64| added(move |_, row| size * (6.0 * row[0]).sin());
+    let (clean, _) = replay(&samples(), "", 0);
+    assert_eq!(clean["verdict"], "accepted");
+    let (report, run) = replay(&vibrating(0.5), "", 0);
+    assert_eq!(report["verdict"], "accepted_with_misfit");
+    run.prints("verdict: accepted, with a misfit of ");
+    run.prints("an error of 5 % of the rms torque is accepted");
+    for name in NAMES {
+        assert!(base(&report, name, "sigma") > 0.9 * base(&clean, name, "sigma"), "{name}");
+    }
+    let (report, _) = replay(&vibrating(0.5), "--accept-error 0.5", 3);
+    assert_eq!(report["verdict"], "refused");
+    let (report, _) = replay(&vibrating(6.0), "", 3);
+    assert!(reasons(&report).contains(&"validation"), "{:?}", reasons(&report));
+    let (report, _) = replay(&vibrating(6.0), "--accept-error 60", 0);
+    assert_eq!(report["verdict"], "accepted_with_misfit");
+    let message = scarab(&format!("replay {MUJOCO} --leg mujoco-leg --accept-error 101")).refusal();
+    assert_contains(&message, "--accept-error: must be 0 to 100 percent");
+}
+
+/// Damage of a size from 0 to 1.
+type Damage = fn(f64) -> Vec<[f64; 5]>;
+
+#[test]
+#[ignore = "campaign: .ci/full"]
+fn more_damage_is_never_judged_milder() {
+    let kinds: [(&str, Damage); 8] = [
+        ("offset drift", |size| added(|share, _| 30.0 * size * share)),
+        ("torque drift", |size| added(|share, row| size * share * row[3])),
+        ("step", |size| added(|share, _| if share > 0.5 { 20.0 * size } else { 0.0 })),
+        ("spring", |size| added(|_, row| 30.0 * size * row[1])),
+        ("vibration", |size| added(|_, row| 10.0 * size * (6.0 * row[0]).sin())),
+        ("drive of the knee at the base", |size| added(|_, row| -size * row[4])),
+        ("torque scale", |size| added(|_, row| 0.5 * size * row[3])),
+        ("encoder scale", |size| {
+            let mut samples = samples();
+            samples.iter_mut().for_each(|row| row[2] *= 1.0 + 0.2 * size);
+            samples
+        }),
+    ];
+    let folder = Folder::new();
+    for (kind, damaged) in kinds {
+        let verdict = |step: i32| {
+            folder.write("walk.csv", csv(&damaged(2.0_f64.powi(step - 9))));
+            let printed = folder.scarab("replay --leg mujoco-leg --split 0.666666 @walk.csv").printed;
+            ["verdict: accepted (", "verdict: accepted, with a misfit", "verdict: refused"]
+                .iter()
+                .position(|verdict| printed.contains(verdict))
+                .unwrap_or_else(|| panic!("{kind}: {printed}"))
+        };
+        let verdicts: Vec<usize> = (0..10).map(verdict).collect();
+        assert!(verdicts.is_sorted() && verdicts[9] == 2, "{kind}: {verdicts:?}");
+    }
+}

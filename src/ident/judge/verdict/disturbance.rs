@@ -23,7 +23,7 @@ impl<T: Real> Thresholds<T> {
                 Some(joint),
                 None,
                 share,
-                self.largest_error_share,
+                self.largest_whole_error_share,
             );
         }
     }

@@ -1,14 +1,16 @@
 //! Tests of the fit: on the motion identified from and on held-out motions.
 //!
 //! ```text
-//! expected^2 = v S + tr(R Cov R') / n         noise through the filter, and the parameters' uncertainty
-//! error^2   <= expected^2 q(n m S) + (harmless share * rms torque)^2
+//! u^2        = tr(R Cov R') / n                       the parameters' uncertainty, on a held-out motion
+//! u0         = u * least(1, sqrt(v S) / training error)
+//! error^2   <= v S q(n m S) + (3 u0)^2 + (accepted share * rms torque)^2
+//! error     <= ratio * training error + margin * rms torque + 3 u0
 //! ```
 //!
-//! v is the variance of a 500 Hz sample's noise, from its own scatter (`noise`). S is the sum of h^2; n rows
-//! are worth m S independent ones each. q is the quantile of chi-square over its degrees of freedom. Neither
-//! side uses the training's residual, so a bad training widens no limit. Only where v is unknown (samples
-//! from another grid) the training's residual takes its place, times `largest_error_ratio`.
+//! v is the variance of a 500 Hz sample's noise, from its own scatter (`noise`), zero if unknown. S is the
+//! sum of h^2; n rows are worth m S independent ones each. q is the quantile of chi-square over its degrees
+//! of freedom. The first limit does not use the training's residual, so a bad training widens nothing. The
+//! second applies where noise does not explain that residual.
 
 use super::{Evidence, Reason, Test, Thresholds, VerdictBuilder};
 use crate::ident::judge::residual::Residual;
@@ -37,27 +39,40 @@ impl<T: Real> Thresholds<T> {
     ) {
         for (joint, size) in training.torque.iter().enumerate() {
             let Some(error) = training.torque_error(joint, values) else { continue }; // the joint never moved: unexcited
-            let mut limit = self.largest_error_share * size.root_mean_square;
-            if let Some(noise) = training.filtered_noise(joint) {
-                let allowed = self.allowed(training, joint, noise * noise, self.largest_misfit_share);
-                limit = real::min(limit, allowed);
-            }
+            let systematic = (self.accepted_error_share + self.error_margin_share) * size.root_mean_square;
+            let limit = self.allowed(training, joint, systematic);
             builder.at_most(Reason::Residual, Test::TrainingError, Some(joint), None, error, limit);
         }
     }
 
-    /// Largest error of a joint's filtered torque; `expected` is its variance by noise and uncertainty.
+    /// Largest error of a joint's filtered torque by noise and a systematic error.
     fn allowed<const N: usize, const B: usize>(
         &self,
         record: &Record<T, N, B>,
         joint: usize,
-        expected: T,
-        harmless: T,
+        systematic: T,
     ) -> T {
         let freedom =
             T::from_double(f64::from(record.rows[joint])) * real::min(record.row_information, T::one());
-        let systematic = harmless * record.torque[joint].root_mean_square;
-        real::sqrt(expected * self.variance_ratio(freedom) + systematic * systematic)
+        let noise = record.filtered_noise(joint).unwrap_or(T::zero());
+        real::sqrt(noise * noise * self.variance_ratio(freedom) + systematic * systematic)
+    }
+
+    /// Error of a held-out torque that the noise of the motion identified from permits. `uncertain` follows
+    /// from the scatter of its residual, which a wrong model enlarges; that part is taken out.
+    pub(crate) fn drawn<const N: usize, const B: usize>(
+        &self,
+        training: &Record<T, N, B>,
+        joint: usize,
+        values: &[T; B],
+        uncertain: T,
+    ) -> T {
+        let (noise, error) = (training.filtered_noise(joint), training.torque_error(joint, values));
+        let share = match (noise, error) {
+            (Some(noise), Some(error)) if error > noise => noise / error,
+            _ => T::one(),
+        };
+        self.uncertainty_sigmas * share * uncertain
     }
 
     /// Judges the prediction of a held-out motion: no worse than noise and parameter covariance predict.
@@ -88,16 +103,12 @@ impl<T: Real> Thresholds<T> {
             let limit = self.largest_uncertainty_share;
             builder.at_most(Reason::Unexcited, Test::PredictedUncertainty, Some(joint), at, share, limit);
             let error = record.torque_error(joint, values).unwrap_or(T::LARGEST);
-            let limit = match record.filtered_noise(joint) {
-                Some(noise) => {
-                    let expected = noise * noise + uncertain * uncertain;
-                    self.allowed(record, joint, expected, self.harmless_error_share)
-                }
-                None => training.torque_error(joint, values).map_or(T::zero(), |expected| {
-                    self.largest_error_ratio * expected + self.harmless_error_share * size
-                }),
-            };
-            let limit = real::min(limit, self.largest_error_share * size);
+            let drawn = self.drawn(training, joint, values, uncertain);
+            let accepted = self.accepted_error_share * size;
+            let limit = self.allowed(record, joint, real::sqrt(drawn * drawn + accepted * accepted));
+            let trained = training.torque_error(joint, values).unwrap_or(T::zero());
+            let limit =
+                real::min(limit, self.largest_error_ratio * trained + self.error_margin_share * size + drawn);
             builder.at_most(Reason::Validation, Test::ValidationError, Some(joint), at, error, limit);
         }
     }
@@ -145,6 +156,7 @@ mod tests {
     use super::*;
     use crate::ident::record::factor::Factor;
     use crate::ident::record::motion_record::TorqueSize;
+    use crate::ident::record::rows::DECIMATION;
 
     #[test]
     fn a_prediction_is_uncertain_by_its_share_of_the_torque() {
@@ -167,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_allowed_is_that_of_noise_and_the_harmless_share_together() {
+    fn the_error_allowed_is_that_of_noise_and_the_accepted_share_together() {
         let torque = [TorqueSize { mean_absolute: 5.0, root_mean_square: 6.0, speed: 1.0 }];
         let record = |row_information| Record::<f64, 1, 2> {
             row_information,
@@ -176,11 +188,15 @@ mod tests {
         // 400 rows worth 0.25 independent ones each: 100 degrees of freedom;
         // chi-square's 0.999 quantile is 149.449.
         let thresholds = Thresholds { noise_quantile: 3.090_2, ..Thresholds::<f64>::default() };
-        let allowed = |information, harmless| thresholds.allowed(&record(information), 0, 0.04, harmless);
+        let allowed = |information, share| {
+            let known =
+                Record { noise: [0.2 * real::sqrt(DECIMATION as f64 / information)], ..record(information) };
+            thresholds.allowed(&known, 0, share * 6.0)
+        };
         let noise = 0.04 * 1.494_49;
         // Wilson and Hilferty's approximation is good to 0.6 % of the square.
         assert!((allowed(0.25, 0.0) / real::sqrt(noise) - 1.0).abs() < 4e-3);
-        // A harmless share of 2 % of 6 N m.
+        // A share of 2 % of 6 N m.
         let both = real::sqrt(noise + 0.12 * 0.12);
         assert!((allowed(0.25, 0.02) / both - 1.0).abs() < 4e-3);
         // A row has at most the information of one independent row.

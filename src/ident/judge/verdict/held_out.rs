@@ -2,6 +2,8 @@
 
 use super::{Evidence, Reason, Test, Thresholds, Unused, VerdictBuilder};
 use crate::ident::judge::alignment::{Direction, Misalignment};
+use crate::ident::record::motion_record::Record;
+use crate::ident::solve::estimate::Estimate;
 use crate::real::{self, Real};
 
 impl<T: Real> Thresholds<T> {
@@ -9,22 +11,27 @@ impl<T: Real> Thresholds<T> {
     /// sharper test: the part that neighbouring half seconds share contains no noise.
     pub(crate) fn judge_colour<const N: usize, const B: usize>(
         &self,
+        training: &Record<T, N, B>,
         motion: usize,
         unused: &Unused<'_, T, N, B>,
+        estimate: &Estimate<T, B>,
         builder: &mut VerdictBuilder<'_, T>,
     ) {
         for (joint, residual) in unused.residual.joints.iter().enumerate() {
-            let noise = Some(unused.record.noise[joint]).filter(|&noise| noise > T::zero());
-            let share = if noise.is_some() { self.harmless_error_share } else { self.largest_error_share };
-            let harmless = share * unused.record.torque[joint].root_mean_square;
-            let limit = real::max(harmless, residual.slow_by_chance(self.noise_quantile, noise));
+            let noise = unused.record.noise[joint];
+            let forgiven = self.forgives_disturbances;
+            let accepted = self.accepted_error_share * unused.record.torque[joint].root_mean_square;
+            let uncertain = unused.record.uncertainty(joint, estimate);
+            let drawn = self.drawn(training, joint, &estimate.values, uncertain);
+            let systematic = real::sqrt(accepted * accepted + drawn * drawn);
+            let limit = real::max(systematic, residual.slow_by_chance(self.noise_quantile, noise, forgiven));
             let at = (Some(joint), Some(motion));
             builder.at_most(
                 Reason::Validation,
                 Test::SlowResidual,
                 at.0,
                 at.1,
-                residual.slow(noise.is_some()),
+                residual.slow(forgiven),
                 limit,
             );
         }
@@ -63,19 +70,11 @@ impl<T: Real> Thresholds<T> {
     /// significant and larger than the tolerance with which lengths and zeros are known. The worse of the two
     /// estimates counts, alone or together with the other directions.
     ///
-    /// With unknown noise, sigma comes from the model's own errors, which are not white; the tolerance is
-    /// then three times as wide.
-    pub(crate) fn judge_alignment(
-        &self,
-        found: &Misalignment<T>,
-        noise_is_known: bool,
-        builder: &mut VerdictBuilder<'_, T>,
-    ) {
+    pub(crate) fn judge_alignment(&self, found: &Misalignment<T>, builder: &mut VerdictBuilder<'_, T>) {
         let (test, tolerance) = match found.direction {
             Direction::Length => (Test::LinkLength, self.largest_length_error),
             Direction::Zero => (Test::EncoderZero, self.largest_zero_error),
         };
-        let tolerance = if noise_is_known { tolerance } else { T::from_double(3.0) * tolerance };
         let limit = |sigma: T| real::max(tolerance, self.noise_quantile * sigma);
         let (mut value, mut allowed) = (found.delta, limit(found.sigma));
         if let Some((delta, sigma)) = found.beside
@@ -101,7 +100,7 @@ mod tests {
 
     /// Value, limit and pass for a link's length, from its estimates alone and together with the other
     /// directions.
-    fn judged(alone: [f64; 2], beside: Option<[f64; 2]>, noise_is_known: bool) -> (f64, f64, bool) {
+    fn judged(alone: [f64; 2], beside: Option<[f64; 2]>) -> (f64, f64, bool) {
         let thresholds =
             Thresholds { noise_quantile: 5.0, largest_length_error: 0.03, ..Thresholds::default() };
         let [delta, sigma] = alone;
@@ -114,7 +113,7 @@ mod tests {
         };
         let mut seen = None;
         let mut note = |evidence: &Evidence<f64>| seen = Some(*evidence);
-        thresholds.judge_alignment(&found, noise_is_known, &mut VerdictBuilder::new(&mut note));
+        thresholds.judge_alignment(&found, &mut VerdictBuilder::new(&mut note));
         let evidence = seen.expect("one piece of evidence");
         assert_eq!((evidence.test, evidence.joint), (Test::LinkLength, Some(1)));
         (evidence.value, evidence.limit, evidence.passed)
@@ -124,17 +123,15 @@ mod tests {
     fn of_a_length_alone_and_beside_the_others_the_one_that_says_more_is_judged() {
         // As shares of the limit: 0.5 alone, 2 beside; 0.8 alone, 0.5 beside; in a
         // tie the value alone is judged.
-        assert_eq!(judged([0.015, 0.001], Some([-0.06, 0.002]), true), (-0.06, 0.03, false));
-        assert_eq!(judged([0.024, 0.001], Some([0.05, 0.02]), true), (0.024, 0.03, true));
-        assert_eq!(judged([0.015, 0.0], Some([-0.015, 0.0]), true), (0.015, 0.03, true));
-        assert_eq!(judged([0.04, 0.001], None, true), (0.04, 0.03, false));
+        assert_eq!(judged([0.015, 0.001], Some([-0.06, 0.002])), (-0.06, 0.03, false));
+        assert_eq!(judged([0.024, 0.001], Some([0.05, 0.02])), (0.024, 0.03, true));
+        assert_eq!(judged([0.015, 0.0], Some([-0.015, 0.0])), (0.015, 0.03, true));
+        assert_eq!(judged([0.04, 0.001], None), (0.04, 0.03, false));
     }
 
     #[test]
     fn noise_widens_the_limit_of_a_length() {
-        // Five sigmas of 0.01; three times the tolerance for unknown noise.
-        assert_eq!(judged([0.04, 0.01], None, true), (0.04, 0.05, true));
-        let (_, limit, passed) = judged([0.08, 0.001], None, false);
-        assert!((limit - 0.09).abs() < 1e-12 && passed);
+        // Five sigmas of 0.01.
+        assert_eq!(judged([0.04, 0.01], None), (0.04, 0.05, true));
     }
 }

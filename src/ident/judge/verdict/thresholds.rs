@@ -29,18 +29,25 @@ pub struct Thresholds<T> {
     /// once in ten million. A run has some fifty such tests, so noise alone refuses less than
     /// one run in a hundred thousand.
     pub noise_quantile: T,
-    /// Largest error on a held-out motion over that on the training motion, where the noise is
-    /// unknown (samples from another grid). Noise alone gives one; two allows for friction
-    /// that depends on speed and load.
+    /// Systematic error accepted on a held-out motion, as a share of the motion's root mean square torque.
+    /// The servo's feedback makes up for 5 %; who uses the model otherwise states another share.
+    pub accepted_error_share: T,
+    /// Error added to the accepted one on the faster motion identified from, and to
+    /// [`Self::largest_error_ratio`].
+    pub error_margin_share: T,
+    /// Largest error on a held-out motion over that on the training motion; two allows for friction that
+    /// depends on speed and load. Infinite where noise explains the training error: limits then follow from
+    /// the noise.
     pub largest_error_ratio: T,
-    /// Harmless systematic error on a held-out motion, as a share of the motion's root mean square torque:
-    /// the servo's feedback makes up for it.
-    pub harmless_error_share: T,
-    /// Harmless systematic error on the faster motion identified from; applies only with known noise.
-    pub largest_misfit_share: T,
-    /// Largest error ever accepted, as a share of the motion's root mean square torque: such a model explains
+    /// Whether held-out blocks with outliers are left out of the slow residual. Where noise does not explain
+    /// the training error, the bound of an outlier is unknown.
+    pub forgives_disturbances: bool,
+    /// Largest error over all rows, excluded ones too, without a held-out motion: such a model explains
     /// about half of the power of the torque.
-    pub largest_error_share: T,
+    pub largest_whole_error_share: T,
+    /// Standard deviations of the parameters' uncertainty that a prediction may be off by: one recording is
+    /// one draw of the parameters.
+    pub uncertainty_sigmas: T,
     /// Largest uncertainty (one standard deviation) of a held-out torque due to the parameters, as a share of
     /// its root mean square. Beyond a third, three of them are as large as the torque itself.
     pub largest_uncertainty_share: T,
@@ -71,10 +78,12 @@ impl<T: Real> Default for Thresholds<T> {
             largest_negative_sigmas: T::from_double(3.0),
             largest_excess_spreads: T::from_double(5.0),
             noise_quantile: T::from_double(5.2),
-            largest_error_ratio: T::from_double(2.0),
-            harmless_error_share: T::from_double(0.05),
-            largest_misfit_share: T::from_double(0.10),
-            largest_error_share: T::from_double(0.7),
+            accepted_error_share: T::from_double(0.05),
+            error_margin_share: T::from_double(0.05),
+            largest_error_ratio: T::from_double(f64::INFINITY),
+            forgives_disturbances: true,
+            largest_whole_error_share: T::from_double(0.7),
+            uncertainty_sigmas: T::from_double(3.0),
             largest_uncertainty_share: T::from_double(0.3),
             smallest_dynamic_share: T::from_double(0.02),
             largest_length_error: T::from_double(0.03),

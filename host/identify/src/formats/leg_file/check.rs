@@ -98,6 +98,7 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
     top.within("torque_noise_percent", leg.torque_noise_percent, 0.0, 100.0)?;
     // Above 25 Hz the rows at 50 Hz would be independent, and noise would alias into them.
     top.within("bandwidth_hz", leg.bandwidth_hz, 1.0, 25.0)?;
+    top.within("accept_error_percent", leg.accept_error_percent, 0.0, 100.0)?;
     if let Some(celsius) = leg.temperature_c {
         let (low, high) = crate::formats::temperature::RANGE_C;
         top.within("temperature_c", celsius, low, high)?;

@@ -1,8 +1,7 @@
-//! Assumptions of the model that a recording may contradict as a whole: its clock, weight, springs, and what
-//! an angle is measured against.
+//! Assumptions of the model that a recording may contradict as a whole: its clock, its weight, and what an
+//! angle is measured against.
 //!
 //! ```text
-//! spring j          torque_j = Y_j p + k q_j     a spring beside the drive of joint j
 //! clock             Y(q, qd / f, qdd / f^2)      a second of the time column lasts f seconds
 //! no_gravity        Y without gravity            the torque holds no weight
 //! absolute_angle j  Y(q_j - sum_(i < j) (q_i - zero_i))    angle j against the base, not the link before it
@@ -15,6 +14,7 @@ use nalgebra::Vector3;
 use scarab::ident::{RowModel, Smoothed};
 
 use crate::report::doubt::CauseReport;
+use crate::run::logging_errors::Refitted;
 use crate::run::logging_errors::lag::least;
 use crate::run::logging_errors::rows::Equations;
 
@@ -23,25 +23,11 @@ const RATES: [f64; 12] = [0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 2.5, 3.
 /// Rates closer to one than this are no other rate: drift of a clock, which stamps show.
 const SAME_RATE: f64 = 0.02;
 
-/// An assumption that was replaced, with the parameters fitted beside it.
-pub(crate) struct Replaced<const B: usize> {
-    /// The correction as a cause.
-    pub(crate) cause: CauseReport,
-    /// Part of the misfit's power that remains.
-    pub(crate) remaining: f64,
-    /// All parameters.
-    pub(crate) values: [f64; B],
-    /// Columns of the parameters.
-    pub(crate) columns: Vec<[f64; B]>,
-    /// Torques that they explain.
-    pub(crate) torque: Vec<f64>,
-}
-
 /// All assumptions, each replaced alone.
 pub(crate) fn all<const N: usize, const B: usize>(
     equations: &Equations<N, B>,
     zero: &[f64; N],
-) -> Vec<Replaced<B>> {
+) -> Vec<Refitted<B>> {
     let weightless = RowModel { gravity: Vector3::zeros(), ..equations.model().clone() };
     let no_gravity = CauseReport {
         name: "no_gravity",
@@ -63,32 +49,8 @@ pub(crate) fn all<const N: usize, const B: usize>(
         };
         replaced(equations, cause, equations.columns_of(equations.model(), &|instant| relative(instant, joint, zero)))
     }));
-    found.extend((0..N).map(|joint| spring(equations, joint)));
     found.extend(clock(equations));
     found
-}
-
-/// A spring between the two links of a joint, its rest angle among the offsets.
-fn spring<const N: usize, const B: usize>(equations: &Equations<N, B>, joint: usize) -> Replaced<B> {
-    let bent = equations.angles(joint);
-    let plain = equations.fit(&equations.columns, &equations.torque, false);
-    let found = equations.score(&plain, &equations.columns, &equations.torque, &bent);
-    let torque: Vec<f64> =
-        equations.torque.iter().zip(&bent).map(|(torque, angle)| torque - found.delta * angle).collect();
-    let cause = CauseReport {
-        name: "spring",
-        joint: Some(joint + 1),
-        value: found.delta.into(),
-        sigma: found.sigma().into(),
-        words: format!(
-            "torque of joint {} grows with its angle by {:.2} +- {:.2} N m/rad, as of a spring beside the drive",
-            joint + 1,
-            found.delta,
-            found.sigma()
-        ),
-        ..CauseReport::default()
-    };
-    with_torque(equations, cause, equations.columns.clone(), torque)
 }
 
 /// Makes the absolute angle of a joint relative to the link before it, for parallel axes.
@@ -101,7 +63,7 @@ fn relative<const N: usize>(instant: &mut Smoothed<f64, N>, joint: usize, zero: 
 }
 
 /// The rate of the clock that fits best, unless it is the stated one.
-fn clock<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Option<Replaced<B>> {
+fn clock<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Option<Refitted<B>> {
     let columns = |rate: f64| {
         equations.columns_of(equations.model(), &|instant| {
             for joint in 0..N {
@@ -130,20 +92,12 @@ fn replaced<const N: usize, const B: usize>(
     equations: &Equations<N, B>,
     cause: CauseReport,
     columns: Vec<[f64; B]>,
-) -> Replaced<B> {
-    with_torque(equations, cause, columns, equations.torque.clone())
-}
-
-fn with_torque<const N: usize, const B: usize>(
-    equations: &Equations<N, B>,
-    cause: CauseReport,
-    columns: Vec<[f64; B]>,
-    torque: Vec<f64>,
-) -> Replaced<B> {
-    let plain = equations.fit(&equations.columns, &equations.torque, false).cost;
+) -> Refitted<B> {
+    let torque = equations.torque.clone();
+    let plain = equations.fit(&equations.columns, &torque, false).cost;
     let fit = equations.fit(&columns, &torque, false);
     let remaining = (fit.cost / plain.max(1e-300)).max(0.0);
     let words =
         format!("{}; fitted, it explains {:.0} % of the misfit", cause.words, 100.0 * (1.0 - remaining));
-    Replaced { cause: CauseReport { words, ..cause }, remaining, values: fit.values, columns, torque }
+    Refitted { cause: CauseReport { words, ..cause }, remaining, values: fit.values, columns, torque }
 }

@@ -1,29 +1,32 @@
 //! Most likely cause of a refusal, from fits repeated with one error corrected.
 //!
 //! ```text
-//! remaining     misfit of the refit over the torque, root mean square over the joints
+//! remaining     misfit of the refit over the torque, root mean square over the joints; of a sum of torques
+//!               over the torques that were not added
 //! plausible     no parameter that must be positive is below zero by more than 5 sigma;
 //!               torque of the prior's sign and size
 //! ```
 //!
 //! Ranking: findings about samples first, then the plausible correction that leaves least of the misfit.
 //! Where the uncorrected fit is not plausible, a correction must make it so. Otherwise the correction must
-//! halve the misfit's power, or be a direction that refuses. Another clock, no weight, a spring and absolute
-//! angles must explain half of the misfit in any case. Another leg is named only where a link's length or a
-//! zero is significant, and off by no more than its linear estimate can tell.
+//! halve the misfit's power, or be a direction that refuses. Another clock, no weight and absolute angles
+//! must explain half of the misfit in any case. Another leg is named only where a link's length or a zero is
+//! significant, and off by no more than its linear estimate can tell.
 
 use scarab::ident::Test;
 
 use crate::report::doubt::{CauseReport, DirectionReport, ReadAs, SampleFinding};
 use crate::report::findings::{FindingReport, is_small};
-use crate::run::logging_errors::assumption::{self, Replaced};
+use crate::run::logging_errors::assumption;
 use crate::run::logging_errors::directions::{CHANCE, Directions, Found, label};
 use crate::run::logging_errors::fit::segment_sigma;
-use crate::run::logging_errors::lag::{self, Lag};
+use crate::run::logging_errors::lag;
 use crate::run::logging_errors::midway::Midway;
 use crate::run::logging_errors::rows::{Equations, Motion};
 use crate::run::logging_errors::samples::SATURATION;
-use crate::run::logging_errors::{LoggingErrors, Question, joint_words, midway_words, sample_cause};
+use crate::run::logging_errors::{
+    LoggingErrors, Question, Refitted, joint_words, midway_words, sample_cause,
+};
 
 /// Sigma by which a parameter may be negative.
 const NEGATIVE_SIGMA: f64 = 5.0;
@@ -43,6 +46,12 @@ const EQUAL: f64 = 1.1;
 const SMALL_MISFIT: f64 = 0.2;
 /// Misfits closer than this ratio are those of mirrored legs.
 const MIRRORED: f64 = 1.001;
+
+/// Share of its largest value at which a torque counts as zero, and how often one without sign returns there.
+const NEAR_ZERO: f64 = 0.02;
+const LEAST_RETURNS: usize = 3;
+/// Cause: a drive between other links than the model has it.
+const COUPLED_DRIVE: &str = "coupled_drive";
 
 /// Change of the angles and torques of one instant.
 type Change<const N: usize> = Box<dyn Fn(&mut [f64; N], &mut [f64; N])>;
@@ -96,12 +105,14 @@ pub(crate) fn likely<const N: usize, const B: usize>(
         (Some(plain), Some(again)) => (plain, again),
         _ => (question, errors),
     };
-    let here = quality(question, &errors.equations);
+    let power = power(&errors.equations);
+    let here = quality(question, &errors.equations, &power);
     let corrections = corrections(question);
-    let mut tried: Vec<_> = corrections.iter().filter_map(|correction| refit(question, correction)).collect();
+    let mut tried: Vec<_> =
+        corrections.iter().filter_map(|correction| refit(question, correction, &power)).collect();
     // Before the delays, because a low-pass is tried only where it fits clearly better than a delay.
     let lags = lag::all(&errors.equations).into_iter().filter(|lag| lag.significance > CHANCE);
-    tried.extend(lags.map(|lag| of_lag(question, errors, lag, here)));
+    tried.extend(lags.map(|lag| of_refitted(question, errors, lag.refitted, here)));
     for (found, report) in errors.found.iter().zip(&errors.directions) {
         let is_estimate = !found.at_limit || found.explained() > BEYOND;
         let certain = found.significance() > CHANCE && is_estimate && (!report.passed || !here.sound);
@@ -111,10 +122,10 @@ pub(crate) fn likely<const N: usize, const B: usize>(
     }
     let assumptions = assumption::all(&errors.equations, &question.zero());
     let assumptions = assumptions.into_iter().filter(|other| other.remaining < HALF);
-    tried.extend(assumptions.map(|other| of_assumption(question, errors, other, here)));
+    tried.extend(assumptions.map(|other| of_refitted(question, errors, other, here)));
     let midway = errors.midway.as_ref().filter(|midway| midway.refuses());
     tried.extend(midway.map(|midway| changed_midway(midway, here)));
-    tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
+    tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair, &power)));
     let refused: Vec<bool> = tried.iter().map(|tried| is_refusing(errors, &tried.cause)).collect();
     let passing = tried.into_iter().zip(refused).filter(|(tried, refused)| {
         tried.quality.sound && (!here.sound || *refused || tried.quality.remaining < HALVED * here.remaining)
@@ -127,7 +138,7 @@ pub(crate) fn likely<const N: usize, const B: usize>(
     let is_estimate =
         |finding: &&FindingReport| finding.value.known().is_some_and(|value| is_small(finding.test, value));
     match (best, geometry) {
-        (Some(best), _) => best,
+        (Some(best), _) => beyond_unit(question, best),
         // Whatever looks like a large error of geometry is none that is known.
         (None, Some(finding)) if !is_estimate(&finding) => excluded(samples).unwrap_or_else(unknown),
         (None, Some(finding)) => CauseReport {
@@ -137,7 +148,62 @@ pub(crate) fn likely<const N: usize, const B: usize>(
             words: finding.words.clone(),
             ..CauseReport::default()
         },
-        (None, None) => weaker(question, errors, here).or_else(|| excluded(samples)).unwrap_or_else(unknown),
+        (None, None) => unsigned(question)
+            .or_else(|| weaker(question, errors, here))
+            .or_else(|| excluded(samples))
+            .unwrap_or_else(unknown),
+    }
+}
+
+/// A torque that comes back to zero again and again and never crosses it, as a magnitude does.
+fn unsigned<const N: usize, const B: usize>(question: &Question<N, B>) -> Option<CauseReport> {
+    let joint = (0..N).find(|&joint| {
+        let torques: Vec<f64> =
+            question.motions.iter().flat_map(|motion| &motion.torque).map(|all| all[joint]).collect();
+        let [low, high] = [f64::min, f64::max].map(|of| torques.iter().copied().fold(0.0, of));
+        // Resampling swings over at a corner.
+        let zero = NEAR_ZERO * (high - low);
+        let near: Vec<bool> = torques.iter().map(|torque| torque.abs() < zero).collect();
+        let returns = near.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+        (low > -zero || high < zero) && returns >= LEAST_RETURNS
+    })?;
+    Some(CauseReport {
+        name: "unsigned_torque",
+        joint: Some(joint + 1),
+        words: format!(
+            "torque of joint {} returns to zero and never crosses it: is it a magnitude?",
+            joint + 1
+        ),
+        ..CauseReport::default()
+    })
+}
+
+/// A torque in mN m whose scales then differ between the joints is in another unit: a motor's own.
+fn beyond_unit<const N: usize, const B: usize>(question: &Question<N, B>, cause: CauseReport) -> CauseReport {
+    if cause.reads != [ReadAs::MillinewtonMetres] {
+        return cause;
+    }
+    let correction = millinewton_metres();
+    let motions = question.motions.iter().map(|motion| corrected(question, motion, &correction)).collect();
+    let smaller = Question {
+        model: question.model.clone(),
+        motions,
+        noise: question.noise.map(|density| Some(density? / 1e6)),
+        sigma: question.sigma.map(|sigma| sigma / 1e3),
+        ..*question
+    };
+    let errors = LoggingErrors::fit(&smaller).ok().flatten();
+    let mut other = errors.iter().flat_map(|errors| &errors.directions);
+    let Some(scale) = other.find(|found| !found.passed && found.name == "torque_scale") else {
+        return cause;
+    };
+    CauseReport {
+        words: format!(
+            "is the torque in per mille of each motor's rated torque (CiA 402, object 6077)? In mN m, {}",
+            scale.words()
+        ),
+        reads: Vec::new(),
+        ..cause
     }
 }
 
@@ -185,7 +251,7 @@ fn encoder_steps<const N: usize, const B: usize>(
         let is_right = errors.directions.iter().all(|direction| direction.passed)
             && !errors.midway.as_ref().is_some_and(Midway::refuses)
             && !errors.encoder.is_some_and(|bias| bias.refuses())
-            && quality(&calmer, &errors.equations).sound;
+            && quality(&calmer, &errors.equations, &power(&errors.equations)).sound;
         if !is_right {
             return None;
         }
@@ -207,12 +273,13 @@ pub(crate) fn in_degrees<const N: usize, const B: usize>(
     question: &Question<N, B>,
     errors: &LoggingErrors<N, B>,
 ) -> Option<CauseReport> {
-    let here = quality(question, &errors.equations);
+    let power = power(&errors.equations);
+    let here = quality(question, &errors.equations, &power);
     let candidates = angle_units(question).into_iter().chain(unit_pairs(question)).filter(|correction| {
         correction.reads.contains(&ReadAs::Degrees)
             && spans(question, correction.joint, 2.0 * std::f64::consts::TAU)
     });
-    let tried = candidates.filter_map(|correction| refit(question, &correction));
+    let tried = candidates.filter_map(|correction| refit(question, &correction, &power));
     nearest(
         tried.filter(|tried| tried.quality.sound && tried.quality.remaining < 0.5 * here.remaining).collect(),
     )
@@ -280,23 +347,10 @@ fn is_refusing<const N: usize, const B: usize>(errors: &LoggingErrors<N, B>, cau
         })
 }
 
-fn of_lag<const N: usize, const B: usize>(
+fn of_refitted<const N: usize, const B: usize>(
     question: &Question<N, B>,
     errors: &LoggingErrors<N, B>,
-    lag: Lag<B>,
-    here: Quality,
-) -> Tried {
-    let sigma = errors.sigma.map(|sigma| sigma.noise.max(sigma.segments));
-    let sound = is_sound(question, &lag.values, &sigma)
-        && agrees(question, &errors.equations, &lag.columns, &lag.torque);
-    let remaining = here.remaining * lag.remaining.sqrt();
-    Tried { cause: lag.cause, quality: Quality { remaining, sound }, is_shared: false }
-}
-
-fn of_assumption<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    errors: &LoggingErrors<N, B>,
-    other: Replaced<B>,
+    other: Refitted<B>,
     here: Quality,
 ) -> Tried {
     let sigma = errors.sigma.map(|sigma| sigma.noise.max(sigma.segments));
@@ -359,15 +413,18 @@ pub(crate) fn with_other_angles<const N: usize, const B: usize>(
         .collect()
 }
 
-/// Fit of the corrected motions; `None` with too few rows.
+/// Fit of the corrected motions; `None` with too few rows. `uncorrected` is the power of the torques before.
 fn refit<const N: usize, const B: usize>(
     question: &Question<N, B>,
     correction: &Correction<N>,
+    uncorrected: &[f64; N],
 ) -> Option<Tried> {
     let motions: Vec<Motion<N>> =
         question.motions.iter().map(|motion| corrected(question, motion, correction)).collect();
     let equations = question.equations(&motions).ok().flatten()?;
-    let quality = quality(question, &equations);
+    // A sum of torques is larger than each; in N m it must leave less.
+    let power = if correction.name == COUPLED_DRIVE { *uncorrected } else { power(&equations) };
+    let quality = quality(question, &equations, &power);
     let words = format!(
         "{}; then the misfit is {:.1} % of the torque{}",
         correction.words,
@@ -531,7 +588,7 @@ fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
     for joint in 1..N {
         for (sign, word) in [(1.0, "plus"), (-1.0, "minus")] {
             all.push(Correction {
-                name: "coupled_drive",
+                name: COUPLED_DRIVE,
                 joint: Some(joint),
                 words: format!(
                     "torque of joint {joint} {word} that of joint {}: does the drive of joint {} sit before joint {joint}?",
@@ -565,21 +622,27 @@ fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
     all
 }
 
+/// Mean square torque of each joint.
+fn power<const N: usize, const B: usize>(equations: &Equations<N, B>) -> [f64; N] {
+    core::array::from_fn(|joint| {
+        let torques = equations.sources.iter().zip(&equations.torque);
+        let of: Vec<f64> =
+            torques.filter(|(source, _)| source.joint == joint).map(|(_, torque)| torque * torque).collect();
+        of.iter().sum::<f64>() / of.len().max(1) as f64
+    })
+}
+
 fn quality<const N: usize, const B: usize>(
     question: &Question<N, B>,
     equations: &Equations<N, B>,
+    power: &[f64; N],
 ) -> Quality {
     let fit = equations.fit(&equations.columns, &equations.torque, false);
     let Equations { columns, torque, weight, .. } = equations;
     let scatter = segment_sigma(&fit, columns, torque, weight, &equations.clusters());
     let sigma = core::array::from_fn(|base| fit.inverse[base][base].max(0.0).sqrt().max(scatter[base]));
-    let shares = (0..N).map(|joint| {
-        let torques = equations.sources.iter().zip(&equations.torque);
-        let of: Vec<f64> =
-            torques.filter(|(source, _)| source.joint == joint).map(|(_, torque)| torque * torque).collect();
-        let power = of.iter().sum::<f64>() / of.len().max(1) as f64;
-        equations.row_sigma[joint].powi(2) * equations.information() / power.max(1e-300)
-    });
+    let shares = (0..N)
+        .map(|joint| equations.row_sigma[joint].powi(2) * equations.information() / power[joint].max(1e-300));
     Quality {
         remaining: (shares.sum::<f64>() / N as f64).sqrt(),
         sound: is_sound(question, &fit.values, &sigma)

@@ -5,7 +5,11 @@
 //! delay j           torque_j(t + d) = Y_j p                           torque of joint j is d late
 //! encoder_scale j   Y(q_j / (1 + d)) p, about the joint's zero        angle of joint j is logged too large
 //! torque_scale j    torque_j = (1 + d) Y_j p                          torque of joint j against joint 1
-//! gravity           Y with gravity turned back by d about axis 1      the leg file's gravity is turned by d
+//! gravity           Y with gravity turned back by d about axis 1      gravity of the leg file is turned by d
+//! spring j          torque_j = Y_j p + d q_j                          a spring beside the drive of joint j
+//! offset_drift j    torque_j = Y_j p + d s                            s from -0.5 to 0.5 over each recording
+//! torque_drift j    torque_j = (1 + d s) Y_j p                        gain of joint j changes by d
+//! friction_drift j  torque_j = Y_j p + d s (friction of joint j)      its friction changes by d
 //! ```
 //!
 //! Each is a nonlinear least-squares problem in d and p, solved by Gauss-Newton with p eliminated (Golub and
@@ -24,6 +28,9 @@
 //! gain > 0.1 x misfit                 x = 1 - noise^2 / misfit^2, at least 0.02
 //! ```
 //!
+//! A drift leaves the parameters near their mean. Instead of the second condition its torque at the ends of
+//! the recording, half of d, must exceed the accepted share of the rms torque.
+//!
 //! The third condition accepts a real machine, whose misfit has mostly other causes. A value at the end of
 //! its search is no estimate: it may refuse, but is reported as not determined and never named as the cause.
 //! A torque scale common to all joints is invisible without a known mass. In the plane gravity's direction
@@ -34,6 +41,7 @@ use std::borrow::Cow;
 use nalgebra::{Rotation3, Unit, Vector3};
 use rayon::prelude::*;
 use scarab::ident::{RowModel, Smoothed};
+use scarab::model::Parameter;
 use scarab::real::dot;
 
 use crate::run::logging_errors::fit::{Fit, Score};
@@ -73,6 +81,21 @@ pub enum Kind {
     TorqueScale(usize),
     /// Direction of gravity.
     Gravity,
+    /// Spring beside a joint's drive.
+    Spring(usize),
+    /// Change over each recording.
+    Drift(Drifting, usize),
+}
+
+/// What changes over a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drifting {
+    /// Offset of a joint's torque.
+    Offset,
+    /// Gain of a joint's torque.
+    Torque,
+    /// Coulomb and viscous friction of a joint.
+    Friction,
 }
 
 impl Kind {
@@ -80,7 +103,12 @@ impl Kind {
     pub(crate) fn all(joints: usize) -> Vec<Self> {
         let delays = (0..joints).map(Self::Delay);
         let scales = (0..joints).map(Self::EncoderScale);
-        delays.chain(scales).chain((1..joints).map(Self::TorqueScale)).chain([Self::Gravity]).collect()
+        let springs = (0..joints).map(Self::Spring);
+        let drifts = [Drifting::Offset, Drifting::Torque, Drifting::Friction];
+        let drifts =
+            drifts.into_iter().flat_map(|what| (0..joints).map(move |joint| Self::Drift(what, joint)));
+        let plain = delays.chain(scales).chain((1..joints).map(Self::TorqueScale)).chain([Self::Gravity]);
+        plain.chain(springs).chain(drifts).collect()
     }
 
     /// Name in reports.
@@ -90,13 +118,21 @@ impl Kind {
             Self::EncoderScale(_) => "encoder_scale",
             Self::TorqueScale(_) => "torque_scale",
             Self::Gravity => "gravity",
+            Self::Spring(_) => "spring",
+            Self::Drift(Drifting::Offset, _) => "offset_drift",
+            Self::Drift(Drifting::Torque, _) => "torque_drift",
+            Self::Drift(Drifting::Friction, _) => "friction_drift",
         }
     }
 
     /// Joint, from 0.
     pub fn joint(self) -> Option<usize> {
         match self {
-            Self::Delay(joint) | Self::EncoderScale(joint) | Self::TorqueScale(joint) => Some(joint),
+            Self::Delay(joint)
+            | Self::EncoderScale(joint)
+            | Self::TorqueScale(joint)
+            | Self::Spring(joint)
+            | Self::Drift(_, joint) => Some(joint),
             Self::Gravity => None,
         }
     }
@@ -105,7 +141,9 @@ impl Kind {
     pub fn unit(self) -> (&'static str, f64) {
         match self {
             Self::Delay(_) => ("ms", 1e3),
-            Self::EncoderScale(_) | Self::TorqueScale(_) => ("%", 100.0),
+            Self::Spring(_) => ("N m/rad", 1.0),
+            Self::Drift(Drifting::Offset, _) => ("N m", 1.0),
+            Self::EncoderScale(_) | Self::TorqueScale(_) | Self::Drift(..) => ("%", 100.0),
             Self::Gravity => ("deg", 180.0 / std::f64::consts::PI),
         }
     }
@@ -118,9 +156,11 @@ impl Kind {
         }
     }
 
-    /// Largest plausible magnitude, and the largest step.
+    /// Largest plausible magnitude, and the largest step. A gain that falls by twice its mean ends at zero.
     fn range(self) -> (f64, f64) {
         match self {
+            Self::Spring(_) | Self::Drift(Drifting::Offset, _) => (f64::MAX, f64::MAX),
+            Self::Drift(..) => (1.9, 0.5),
             Self::Delay(_) => (0.2, 0.02),
             Self::EncoderScale(_) => (0.5, 0.1),
             Self::TorqueScale(_) => (20.0, 1.0),
@@ -153,6 +193,8 @@ pub(crate) struct Found<const B: usize> {
     /// Directions that cannot be distinguished from this one.
     pub(crate) alike: Vec<String>,
     column: Vec<f64>,
+    /// What drifts over the rms torque of its joint, root mean square at value one.
+    share: f64,
 }
 
 impl<const B: usize> Found<B> {
@@ -174,6 +216,11 @@ impl<const B: usize> Found<B> {
     /// Share of the misfit that the direction explains.
     pub(crate) fn explained(&self) -> f64 {
         if self.seen { ((self.cost.0 - self.cost.1) / self.cost.0).max(0.0) } else { 0.0 }
+    }
+
+    /// Torque of a drift at the ends of a recording over the rms torque of its joint; `None` for others.
+    pub(crate) fn end_share(&self) -> Option<f64> {
+        matches!(self.kind, Kind::Drift(..)).then_some(0.5 * self.value.abs() * self.share)
     }
 
     /// Variance that a possible error adds to each parameter: the shift, reduced by the part that chance
@@ -262,6 +309,57 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
                 let turned = RowModel { gravity: turn * model.gravity, ..model.clone() };
                 (Cow::Owned(all.columns_of(&turned, &|_| {})), plain)
             }
+            Kind::Spring(_) | Kind::Drift(Drifting::Offset, _) => {
+                let beside = self.beside(kind, &[]);
+                let rest = all.torque.iter().zip(&beside).map(|(torque, beside)| torque - value * beside);
+                (Cow::Borrowed(&all.columns), Cow::Owned(rest.collect()))
+            }
+            Kind::Drift(what, joint) => {
+                let drifts = self.drifting(what, joint);
+                let pairs = all.columns.iter().zip(&all.sources);
+                let columns = pairs.map(|(row, source)| {
+                    let factor = if source.joint == joint { 1.0 + value * source.drift() } else { 1.0 };
+                    core::array::from_fn(|base| if drifts[base] { factor * row[base] } else { row[base] })
+                });
+                (Cow::Owned(columns.collect()), plain)
+            }
+        }
+    }
+
+    /// Base parameters whose torque drifts.
+    fn drifting(&self, what: Drifting, joint: usize) -> [bool; B] {
+        core::array::from_fn(|base| match what {
+            Drifting::Offset => false,
+            Drifting::Torque => true,
+            Drifting::Friction => self
+                .equations
+                .model()
+                .base
+                .independent(base)
+                .is_some_and(|(of, kind)| of == joint && matches!(kind, Parameter::FC | Parameter::FV)),
+        })
+    }
+
+    /// Torque that a spring or a drift of value one adds to each equation, by these parameters.
+    fn beside(&self, kind: Kind, parameters: &[f64]) -> Vec<f64> {
+        let all = self.equations;
+        match kind {
+            Kind::Spring(joint) => all.angles(joint),
+            Kind::Drift(what, joint) => {
+                let drifts = self.drifting(what, joint);
+                let of = |row: &[f64; B]| -> f64 {
+                    let each = row.iter().zip(parameters).zip(drifts).filter(|(_, drifts)| *drifts);
+                    each.map(|((element, value), _)| element * value).sum()
+                };
+                let rows = all.columns.iter().zip(&all.sources);
+                rows.map(|(row, source)| match what {
+                    _ if source.joint != joint => 0.0,
+                    Drifting::Offset => source.drift(),
+                    _ => source.drift() * of(row),
+                })
+                .collect()
+            }
+            _ => Vec::new(),
         }
     }
 
@@ -293,6 +391,7 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
                     .map(|(torque, source)| if source.joint == joint { factor * torque } else { 0.0 })
                     .collect()
             }
+            Kind::Spring(_) | Kind::Drift(..) => self.beside(kind, &fit.values),
             Kind::EncoderScale(_) | Kind::Gravity => {
                 let step = kind.step();
                 let beside = fit.predictions(&self.system(kind, value + step).0);
@@ -367,7 +466,10 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
             if here.is_settled() {
                 return here;
             }
-            let least = if kind.joint().is_some() { LEAST_SCALE.max(-largest) } else { -largest };
+            let least = match kind {
+                Kind::EncoderScale(_) | Kind::TorqueScale(_) => LEAST_SCALE.max(-largest),
+                _ => -largest,
+            };
             let wanted = (here.value + share * here.score.delta.clamp(-step, step)).clamp(least, largest);
             let next = self.at(kind, wanted);
             if next.fit.cost <= here.fit.cost {
@@ -422,7 +524,25 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
             values: fit.values,
             alike: Vec::new(),
             column: score.column,
+            share: self.share(kind, &fit.values),
         }
+    }
+
+    /// What drifts over the rms torque of its joint, root mean square; zero for other kinds.
+    fn share(&self, kind: Kind, parameters: &[f64; B]) -> f64 {
+        let Kind::Drift(_, joint) = kind else { return 0.0 };
+        let all = self.equations;
+        let (mut drifting, mut torque) = (0.0, 0.0);
+        for ((beside, measured), source) in
+            self.beside(kind, parameters).iter().zip(&all.torque).zip(&all.sources)
+        {
+            if source.joint == joint {
+                drifting += beside * beside;
+                torque += measured * measured;
+            }
+        }
+        // The mean square of s itself is a twelfth.
+        (12.0 * drifting / torque.max(1e-300)).sqrt()
     }
 }
 

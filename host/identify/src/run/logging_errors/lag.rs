@@ -13,8 +13,8 @@
 
 use crate::report::doubt::CauseReport;
 use crate::run::logging_errors::fit::Fit;
-use crate::run::logging_errors::joint_words;
 use crate::run::logging_errors::rows::Equations;
+use crate::run::logging_errors::{Refitted, joint_words};
 
 /// Times tried by the scan, s.
 const SCAN_S: [f64; 8] = [0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064, 0.128];
@@ -39,20 +39,11 @@ enum Kind {
 
 /// A lag with the parameters fitted beside it.
 pub(crate) struct Lag<const B: usize> {
-    /// The lag as a cause.
-    pub(crate) cause: CauseReport,
+    pub(crate) refitted: Refitted<B>,
     /// Time over its standard deviation.
     pub(crate) significance: f64,
-    /// Part of the misfit's power that remains.
-    pub(crate) remaining: f64,
     /// Cost of the equations of the lagging joints.
     own_cost: f64,
-    /// All parameters with the lag.
-    pub(crate) values: [f64; B],
-    /// Columns with the lag.
-    pub(crate) columns: Vec<[f64; B]>,
-    /// Torques without the lag.
-    pub(crate) torque: Vec<f64>,
 }
 
 /// Delay of all torques, then the low-pass of all and of each joint where it fits better than a delay.
@@ -122,13 +113,15 @@ impl<const N: usize, const B: usize> Search<'_, N, B> {
             .sum();
         let sigma_s = (remaining.sqrt() * scored.noise_sigma).max(scored.segment_sigma);
         Lag {
-            cause: cause(kind, joint, time_s, sigma_s, remaining),
+            refitted: Refitted {
+                cause: cause(kind, joint, time_s, sigma_s, remaining),
+                remaining,
+                values: fit.values,
+                columns,
+                torque,
+            },
             significance: time_s / sigma_s.max(1e-12),
-            remaining,
             own_cost,
-            values: fit.values,
-            columns,
-            torque,
         }
     }
 }

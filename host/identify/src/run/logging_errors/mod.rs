@@ -9,9 +9,9 @@
 //! | --- | --- |
 //! | [`rows`] | filtered rows of whole recordings in double precision, weights |
 //! | [`fit`] | least squares, a further column beside it, both standard deviations |
-//! | [`directions`] | delay, encoder scale, torque scale, gravity |
+//! | [`directions`] | delay, encoder scale, torque scale, gravity, springs, drifts |
 //! | [`lag`] | low-pass or delay of the torque as a cause |
-//! | [`assumption`] | another clock, no weight, a spring, absolute angles as a cause |
+//! | [`assumption`] | another clock, no weight, absolute angles as a cause |
 //! | [`midway`] | gain or sign of the torque that changes midway |
 //! | [`encoder`] | bias by the steps of an encoder |
 //! | [`noise`] | noise of the torque at the recording's own rate |
@@ -73,6 +73,8 @@ pub(crate) struct Question<const N: usize, const B: usize> {
     pub(crate) motor_ratio: [Option<f64>; N],
     /// How the angles were read.
     pub(crate) encoders: Encoders<N>,
+    /// Error of a joint's torque that is accepted, as a share of its root mean square.
+    pub(crate) accepted_error: f64,
 }
 
 impl<const N: usize, const B: usize> Question<N, B> {
@@ -133,6 +135,20 @@ impl<const N: usize, const B: usize> Question<N, B> {
     fn at(&self, bandwidth_hz: f64) -> Self {
         Self { model: self.model_at(bandwidth_hz), motions: self.motions.clone(), bandwidth_hz, ..*self }
     }
+}
+
+/// An error that was corrected in the rows, with the parameters fitted beside it.
+pub(crate) struct Refitted<const B: usize> {
+    /// The error as a cause.
+    pub(crate) cause: CauseReport,
+    /// Part of the misfit's power that remains.
+    pub(crate) remaining: f64,
+    /// All parameters.
+    pub(crate) values: [f64; B],
+    /// Columns of the parameters.
+    pub(crate) columns: Vec<[f64; B]>,
+    /// Torques that they explain.
+    pub(crate) torque: Vec<f64>,
 }
 
 /// Results of all checks.
@@ -225,8 +241,10 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
         });
         let systematic = systematic(&misfit_over_noise, &equations.rows);
         let parameters = sigma.map(|sigma| sigma.total());
-        let directions: Vec<DirectionReport> =
-            found.iter().map(|found| DirectionReport::new(found, &parameters, systematic)).collect();
+        let directions: Vec<DirectionReport> = found
+            .iter()
+            .map(|found| DirectionReport::new(found, &parameters, systematic, question.accepted_error))
+            .collect();
         for (found, _) in found.iter().zip(&directions).filter(|(_, report)| report.passed) {
             for (sigma, variance) in sigma.iter_mut().zip(found.variance()) {
                 sigma.logging = sigma.logging.hypot(variance.sqrt());

@@ -9,16 +9,16 @@ use crate::run::logging_errors::directions::{
 
 impl DirectionReport {
     /// Judges a direction. `sigma` is that of the parameters, `systematic` the part of the misfit that is not
-    /// noise.
-    pub fn new<const B: usize>(found: &Found<B>, sigma: &[f64; B], systematic: f64) -> Self {
+    /// noise, `accepted` the share of the torque by which it may be wrong.
+    pub fn new<const B: usize>(found: &Found<B>, sigma: &[f64; B], systematic: f64, accepted: f64) -> Self {
         let (unit, factor) = found.kind.unit();
         let shifts = found.shift.iter().zip(sigma).filter(|(_, sigma)| **sigma > 0.0);
         let largest = shifts.map(|(shift, sigma)| (shift / sigma).abs()).fold(0.0, f64::max);
         let needed = EXPLAINED_SHARE * systematic.max(SMALLEST_SYSTEMATIC);
         let known = |value: f64| if found.seen { Number::from(value) } else { Number::UNKNOWN };
         let estimate = |value: f64| if found.at_limit { Number::UNKNOWN } else { known(value) };
-        let refused =
-            found.significance() > CHANCE && largest > TOLERATED_SHIFT && found.explained() > needed;
+        let matters = found.end_share().map_or(largest > TOLERATED_SHIFT, |share| share > accepted);
+        let refused = found.significance() > CHANCE && matters && found.explained() > needed;
         Self {
             name: found.kind.name(),
             joint: found.kind.joint().map(|joint| joint + 1),

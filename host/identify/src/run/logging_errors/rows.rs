@@ -171,6 +171,13 @@ pub(crate) struct RowSource {
     pub(crate) share: f64,
 }
 
+impl RowSource {
+    /// Time of a drift: from -0.5 at the start of the motion to 0.5 at its end.
+    pub(crate) fn drift(&self) -> f64 {
+        self.share - 0.5
+    }
+}
+
 /// All usable rows of all joints, one equation each.
 #[derive(Clone, Debug)]
 pub(crate) struct Equations<const N: usize, const B: usize> {

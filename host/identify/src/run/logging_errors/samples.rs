@@ -13,6 +13,7 @@
 //!               or e >= 6 (c + 1)
 //!          or   a >= 20, a >= 3 (b + 1), and less than 0.3 of the noise elsewhere: flattened by a filter
 //! held          runs of 2 and more that end in a jump of 3 u: 20 % of the torques, 40 % of the angles
+//! zero rows     3 gaps of 1 to 10 rows that are zero in every column, some angle above 0.05 rad beside each
 //! frozen        a run of 25 ms, at least 5 samples, in a column that is noisy elsewhere; or an angle that
 //!               then jumps by 5 u and 3 times its next step
 //! ```
@@ -31,7 +32,7 @@ use std::ops::Range;
 
 use scarab_base::stats::quantile;
 
-use crate::formats::recording::Recording;
+use crate::formats::recording::{JointSeries, Recording};
 use crate::report::doubt::SampleFinding;
 use crate::run::logging_errors::encoder::Encoder;
 
@@ -39,6 +40,8 @@ use crate::run::logging_errors::encoder::Encoder;
 pub(crate) const SATURATION: &str = "saturation";
 /// Finding of values that are repeated.
 pub(crate) const HELD: &str = "held_samples";
+/// Finding of rows that are zero in every column.
+pub(crate) const ZERO_ROWS: &str = "zero_rows";
 /// Finding of a coarse column; never refuses.
 pub(crate) const QUANTISED: &str = "quantised";
 
@@ -63,10 +66,18 @@ const HELD_ANGLE: f64 = 0.4;
 const HARMLESS_HOLD_S: f64 = 0.0045;
 /// Longest time for which a column that is updated regularly holds a value, s.
 const LONGEST_HOLD_S: f64 = 0.1;
+/// Angle on both sides of a row of zeros from which the leg cannot have been at zero, rad.
+const JUMP_RAD: f64 = 0.05;
+/// Most rows of zeros in a row, and fewest such gaps that are no accident.
+const LONGEST_GAP: usize = 10;
+const LEAST_GAPS: usize = 3;
 /// Largest lost share of a recording: beyond it the rest is a biased choice, as with disturbed rows.
 const LARGEST_LOSS: f64 = 1.0 / 3.0;
 /// Least number of levels from which a column shows the step between them.
 const LEAST_LEVELS: usize = 20;
+/// Part of a step by which levels that are whole steps apart may miss. By chance a fifth of all distances are
+/// so close.
+const WHOLE_STEP: f64 = 0.1;
 /// Steps from which a column is coarse: 12 bits at the joint, and a share of a torque's range.
 const COARSE_RAD: f64 = 1.5e-3;
 const COARSE_SHARE: f64 = 0.01;
@@ -211,6 +222,7 @@ impl<'a> Examination<'a> {
         let known: Vec<bool> =
             self.is_frozen.iter().zip(&at_limit).map(|(&frozen, &at)| frozen || at).collect();
         let mut findings = self.columns(&known);
+        findings.extend(self.zero_rows());
         let is_held = findings.iter().any(|finding| finding.name == HELD && finding.refuses);
         let spans = if is_held { Vec::new() } else { self.spans(&at_limit) };
         let lost = lost_share(self.recording, &spans, reach_s);
@@ -278,6 +290,34 @@ impl<'a> Examination<'a> {
             refuses: excluded.refuses,
             ..self.finding(SATURATION, Some(limit.joint), text)
         }
+    }
+
+    /// Rows without any angle and torque between rows with some, into which the leg cannot have moved.
+    fn zero_rows(&self) -> Option<SampleFinding> {
+        let is_zero = |row: usize| {
+            let joints = &self.recording.joints;
+            joints.iter().all(|joint| joint.position_rad[row] == 0.0 && joint.torque_nm[row] == 0.0)
+        };
+        let rows: Vec<bool> = (0..self.recording.time_s.len()).map(is_zero).collect();
+        let is_apart = |run: &Range<usize>| {
+            let (Some(before), true) = (run.start.checked_sub(1), run.end < rows.len()) else { return false };
+            let from_zero = |joint: &JointSeries| {
+                let [before, after] = [before, run.end].map(|row| joint.position_rad[row]);
+                before * after > 0.0 && before.abs().min(after.abs()) > JUMP_RAD
+            };
+            rows[run.start] && run.len() <= LONGEST_GAP && self.recording.joints.iter().any(from_zero)
+        };
+        let gaps: Vec<Range<usize>> = runs(&rows).filter(is_apart).collect();
+        let first = gaps.first().filter(|_| gaps.len() >= LEAST_GAPS)?;
+        let share = count(&rows) / rows.len() as f64;
+        let time_s = self.recording.time_s[first.start];
+        let text = format!(
+            "{:.1} % of the rows are zero in every column, first at {time_s:.3} s: does another program publish on the \
+             same topic? Remove these rows",
+            100.0 * share
+        );
+        let finding = self.finding(ZERO_ROWS, None, text);
+        Some(SampleFinding { value: time_s, share, refuses: true, ..finding })
     }
 
     /// Stretches in which a column is constant while the leg moves.
@@ -622,10 +662,18 @@ pub(super) fn step(values: &[f64]) -> f64 {
 }
 
 /// Step between the levels of a column, which are its repeated values: the sensor's last bit. Interpolation
-/// to another clock, which leaves fractions of a bit, does not change it. Zero with few levels.
+/// to another clock, which leaves fractions of a bit, does not change it. Zero with few levels, and where the
+/// levels are not whole steps apart: an exact angle repeats its values wherever the joint rests.
 fn level_step(values: &[f64]) -> f64 {
     let levels: Vec<f64> = runs(values).filter(|run| run.len() > 1).map(|run| values[run.start]).collect();
-    if levels.len() < LEAST_LEVELS { 0.0 } else { step(&levels) }
+    if levels.len() < LEAST_LEVELS {
+        return 0.0;
+    }
+    let u = step(&levels);
+    let changes = changes(&levels);
+    let whole =
+        changes.iter().filter(|&&change| (change / u - (change / u).round()).abs() < WHOLE_STEP).count();
+    if 2 * whole > changes.len() { u } else { 0.0 }
 }
 
 #[cfg(test)]

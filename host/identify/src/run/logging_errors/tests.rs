@@ -100,6 +100,7 @@ fn question_of(model: RowModel<f64, 2, COLUMNS>, motions: Vec<Motion<2>>) -> Que
         encoders: Encoders { joints: [None; 2], sample_s: 0.002 },
         noise: [Some(NOISE_NM * NOISE_NM / 500.0); 2],
         sigma: [0.0; COLUMNS],
+        accepted_error: 0.05,
         model,
     }
 }
@@ -249,7 +250,7 @@ fn a_sign_that_changes_midway_is_found_with_its_time() {
 #[test]
 fn units_signs_and_columns_are_named() {
     type Damage = fn(&mut [f64; 2], &mut [f64; 2]);
-    let cases: [(&str, Damage); 9] = [
+    let cases: [(&str, Damage); 11] = [
         ("torque_sign", |_, torques| torques.iter_mut().for_each(|torque| *torque = -*torque)),
         ("torque_unit", |_, torques| torques.iter_mut().for_each(|torque| *torque *= 1000.0)),
         ("angle_unit", |angles, _| angles.iter_mut().for_each(|angle| *angle = angle.to_degrees())),
@@ -259,6 +260,9 @@ fn units_signs_and_columns_are_named() {
         ("angle_sign", |angles, _| angles[1] = -angles[1]),
         ("absolute_angle", |angles, _| angles[1] += angles[0]),
         ("coupled_drive", |_, torques| torques[0] -= torques[1]),
+        ("unsigned_torque", |_, torques| torques.iter_mut().for_each(|torque| *torque = torque.abs())),
+        // Per mille of 20 and 10 N m.
+        ("torque_unit", |_, torques| (torques[0], torques[1]) = (50.0 * torques[0], 100.0 * torques[1])),
     ];
     for (name, damage) in cases {
         let mut damaged = motion([0.0; 2], 1);
@@ -267,6 +271,8 @@ fn units_signs_and_columns_are_named() {
         }
         let cause = cause_of(&question(vec![damaged]));
         assert_eq!(cause.name, name, "{}", cause.words);
+        // A unit that another error follows is no option to repeat the command with.
+        assert_eq!(cause.words.contains("per mille"), name == "torque_unit" && cause.reads.is_empty());
     }
 }
 
@@ -302,6 +308,40 @@ fn a_spring_beside_the_drive_is_found_at_its_size() {
     assert_eq!((cause.name, cause.joint), ("spring", Some(2)), "{}", cause.words);
     let (found, sigma) = (cause.value.known().expect("a size"), cause.sigma.known().expect("a size"));
     assert!((found - 15.0).abs() < 4.0 * sigma, "{found} +- {sigma}");
+}
+
+/// Adds to the torque of the first joint, from the share of the recording and the undamaged torques and
+/// speeds.
+fn drifting(added: impl Fn(f64, f64, f64) -> f64) -> Question<2, COLUMNS> {
+    let mut damaged = motion([0.0; 2], 1);
+    let count = damaged.torque.len() as f64;
+    for (index, torques) in damaged.torque.iter_mut().enumerate() {
+        let speed = instant(index as f64 / 500.0).velocity[0];
+        torques[0] += added(index as f64 / count - 0.5, torques[0], speed);
+    }
+    question(vec![damaged])
+}
+
+#[test]
+fn what_drifts_is_found_at_its_size_and_refused_beyond_the_accepted_error() {
+    let cases: [(&str, f64, Question<2, COLUMNS>); 3] = [
+        ("offset_drift", 6.0, drifting(|share, _, _| 6.0 * share)),
+        ("torque_drift", 30.0, drifting(|share, torque, _| 0.3 * share * torque)),
+        ("friction_drift", 180.0, drifting(|share, _, speed| 1.8 * share * (2.0 * speed.signum() + speed))),
+    ];
+    for (name, size, question) in cases {
+        let found = errors(&question);
+        let (value, sigma) = estimate(&found, name, Some(1));
+        // 3 % for the encoder's smoothing of the sign at a reversal.
+        assert!((value - size).abs() < 4.0 * sigma + 0.03 * size, "{name}: {value} +- {sigma}");
+        assert!(refused(&found).contains(&(name, Some(1))), "{name}: {:?}", refused(&found));
+        let cause = cause_of(&question);
+        assert_eq!((cause.name, cause.joint), (name, Some(1)), "{}", cause.words);
+    }
+    // A smaller drift, within the accepted error, is seen and not refused.
+    let found = errors(&drifting(|share, _, _| 1.5 * share));
+    let (value, sigma) = estimate(&found, "offset_drift", Some(1));
+    assert!(value > 5.2 * sigma && refused(&found).is_empty(), "{value} +- {sigma}, {:?}", refused(&found));
 }
 
 #[test]

@@ -12,6 +12,9 @@ use crate::leg::background::Background;
 use crate::report::Source;
 use crate::report::findings::FindingReport;
 
+/// Largest held-out error over the training error where noise does not explain the latter.
+const LARGEST_ERROR_RATIO: f32 = 2.0;
+
 /// Verdict and what it rests on.
 pub(super) struct Judged<const N: usize, const B: usize> {
     pub(crate) verdict: Verdict,
@@ -23,15 +26,17 @@ pub(super) struct Judged<const N: usize, const B: usize> {
     pub(crate) sources: Vec<Source>,
 }
 
-/// Judges the result by the held-out part, whose torques have this noise.
+/// Judges the result by the held-out part, whose torques have this noise. Errors of this share of the torque
+/// are accepted.
 pub(super) fn judge<const N: usize, const B: usize>(
     background: &Background<N, B>,
     solved: &mut Solved<N, B>,
     held_out: &[Samples<N>],
     noise: &[Option<f64>; N],
+    accepted_error: f64,
 ) -> Judged<N, B> {
     let (values, model) = (solved.values(), &background.device);
-    let Solved { solver, recorder, load, noise_is_known, .. } = solved;
+    let Solved { solver, recorder, load, is_explained, .. } = solved;
     let mut evaluation = Box::new(HeldOut::<f32, N, B, PENDING>::new(recorder.reach()));
     let dropped = &solver.record().selection.dropped;
     evaluation.begin(&values, &solver.unexpected(), &solver.row_noise(), dropped);
@@ -54,10 +59,9 @@ pub(super) fn judge<const N: usize, const B: usize>(
     if let Some(load) = load {
         unused = unused.corrected(&[1.0; N], load);
     }
-    unused.noise = if *noise_is_known { sample_noise(noise) } else { [0.0; N] };
+    unused.noise = sample_noise(noise);
     let unused = (!held_out.is_empty()).then_some(unused);
-    // The bias of the parameters is judged instead (`logging_errors::encoder`).
-    let thresholds = Thresholds { largest_pulse_share: f32::INFINITY, ..Thresholds::default() };
+    let thresholds = thresholds(*is_explained, accepted_error);
     let mut findings = Vec::new();
     let verdict = solver.judge(
         model,
@@ -67,4 +71,25 @@ pub(super) fn judge<const N: usize, const B: usize>(
         &mut |piece| findings.push(FindingReport::new(piece, &["recording"])),
     );
     Judged { verdict, findings, unused, predictions, sources }
+}
+
+/// Limits for a recording whose misfit the noise explains or not. Where not, errors of length and zero come
+/// from the model's own errors, which are not white: three times the tolerance.
+fn thresholds(is_explained: bool, accepted_error: f64) -> Thresholds<f32> {
+    // The bias of the parameters is judged instead (`logging_errors::encoder`).
+    let plain = Thresholds {
+        largest_pulse_share: f32::INFINITY,
+        accepted_error_share: accepted_error as f32,
+        ..Thresholds::default()
+    };
+    if is_explained {
+        return plain;
+    }
+    Thresholds {
+        largest_error_ratio: LARGEST_ERROR_RATIO,
+        forgives_disturbances: false,
+        largest_length_error: 3.0 * plain.largest_length_error,
+        largest_zero_error: 3.0 * plain.largest_zero_error,
+        ..plain
+    }
 }

@@ -16,9 +16,9 @@ use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::Recording;
 use crate::leg::background::Background;
-use crate::report::RunReport;
 use crate::report::doubt::{BandwidthReport, CauseReport, ReadAs, RecordingsReport};
 use crate::report::findings::FindingReport;
+use crate::report::{ACCEPTED, ACCEPTED_WITH_MISFIT, EXPLAINED_BY_NOISE, REFUSED, RunReport};
 use crate::run::logging_errors::encoder::{Encoder, Encoders};
 use crate::run::logging_errors::rows::{Equations, Filters, Motion};
 use crate::run::logging_errors::{LoggingErrors, Question, cause, noise as scatter, sample_finding};
@@ -30,8 +30,6 @@ use crate::run::replay::screening::Screening;
 use crate::run::replay::{Recordings, ReplayOptions};
 use crate::run::resample::{Resampled, TRUSTED_BANDWIDTH};
 
-/// Misfit over noise up to which noise explains the misfit, so that limits follow from the noise.
-const EXPLAINED_BY_NOISE: f64 = 1.3;
 /// Share of a limit of the prior from which a parameter counts as at the limit.
 const AT_LIMIT: f64 = 0.98;
 
@@ -193,7 +191,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             proposed_hz: self.proposed_hz,
             stribeck_hz: self.stribeck_hz,
         });
-        run.verdict = if run.accepted() { "accepted" } else { "refused" };
+        report.accept_error_percent = self.options.accept_error_percent;
         let import = self.options.import.as_ref();
         let current =
             errors.as_ref().and_then(|errors| units::current(&question, &errors.equations, import, None));
@@ -208,6 +206,11 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             .zip(self.wholes.first())
             .map(|(current, whole)| format!("{}: {}", whole.recording.file.display(), current.words));
         run.doubt = Some(report);
+        run.verdict = match (run.accepted(), run.unexplained_misfit()) {
+            (true, None) => ACCEPTED,
+            (true, Some(_)) => ACCEPTED_WITH_MISFIT,
+            (false, _) => REFUSED,
+        };
         Ok(warning)
     }
 
@@ -289,6 +292,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
                 self.options.import.as_ref()?.drives.get(joint)?.motor_ratio
             }),
             encoders: encoders(self.wholes, self.leg),
+            accepted_error: self.options.accept_error_percent / 100.0,
             sigma: core::array::from_fn(|base| estimate.sigma(base).map_or(0.0, f64::from)),
             model,
         };

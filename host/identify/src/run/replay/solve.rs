@@ -19,8 +19,8 @@ pub(super) struct Solved<const N: usize, const B: usize> {
     pub(crate) sources: Vec<Source>,
     /// Base parameters of a known load, which the recorded torque contains.
     pub(crate) load: Option<[f32; B]>,
-    /// Whether the torques' noise explains the misfit.
-    pub(crate) noise_is_known: bool,
+    /// Whether the torques' noise explains the misfit of every joint.
+    pub(crate) is_explained: bool,
     pub(crate) search: Search,
 }
 
@@ -48,10 +48,7 @@ pub(super) fn solve<const N: usize, const B: usize>(
         *count += training.iter().map(|samples| samples.replaced[joint]).sum::<u32>();
     }
     record.noise = sample_noise(noise);
-    let noise_is_known = is_explained_by_noise(&record);
-    if !noise_is_known {
-        record.noise = [0.0; N];
-    }
+    let is_explained = is_explained_by_noise(&record);
     let mut solver = settled(background, record, options);
     let load = load_base(background, options);
     let as_recorded = solver.record().clone();
@@ -73,11 +70,11 @@ pub(super) fn solve<const N: usize, const B: usize>(
         time_disturbances(&mut recorder, background, training, stretches, &mut solver);
         recorder.clear(Ends::Whole);
     }
-    if !noise_is_known {
+    if !is_explained {
         recorder.count_disturbances();
     }
     let load = options.load.is_some().then_some(load);
-    Solved { solver, recorder, sources, load, noise_is_known, search }
+    Solved { solver, recorder, sources, load, is_explained, search }
 }
 
 fn with<const B: usize>(values: [f32; B], load: &[f32; B]) -> [f32; B] {

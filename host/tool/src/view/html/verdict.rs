@@ -14,15 +14,21 @@ use crate::view::tables;
 /// Verdict in large type and in words, with each reason and its limit.
 pub(crate) fn banner(run: &RunReport) -> Markup {
     let validated = !run.validation.is_empty();
+    let misfit = run.accepted_misfit();
     html! {
         section.verdict.accepted[run.accepted()].refused[!run.accepted()] {
             @if run.accepted() {
-                p.word { "Accepted" @if !validated { ", not validated" } }
+                p.word { "Accepted" @if misfit.is_some() { ", with a misfit" } @if !validated { ", not validated" } }
                 p { "The model explains the motion it was identified from" @if validated {
                     ", and predicts the motions that were not used"
                 } ". " (passed(run)) }
                 @if run.is_replay() {
                     @for words in untested_lengths(&run.findings) { p { strong { "Hardly tested: " } (words) "." } }
+                }
+                @if let Some(ratio) = misfit {
+                    p.warning { strong { "Misfit: " } (format!("{ratio:.1}")) " times the noise. The torque holds something that the \
+                        model does not, within the accepted error. The standard deviations contain its scatter, not a constant \
+                        part of it." }
                 }
                 @if !validated {
                     p { strong { "Not validated: " } "no motion was held out, so nothing is known of its predictions." }
@@ -112,8 +118,13 @@ fn meaning(test: &str) -> (bool, &str) {
         "delay" => (false, "delay of the torque against the angle, ms"),
         "encoder_scale" => (false, "error of the angle's scale, %"),
         "torque_scale" => (false, "torque scale against that of joint 1, %"),
+        "spring" => (false, "stiffness of a spring beside the drive, N m/rad"),
+        "offset_drift" => (false, "change of the torque's offset over a recording, N m"),
+        "torque_drift" => (false, "change of the torque's gain over a recording, %"),
+        "friction_drift" => (false, "change of the friction over a recording, %"),
         "gravity" => (false, "angle by which gravity seems turned, degrees"),
         "changed_midway" => (false, "change of the torque's gain midway"),
+        "zero_rows" => (false, "time of the first row of zeros, s"),
         "saturation" => (false, "limit of the recorded torque, N m"),
         "held_samples" => (false, "time for which recorded values are held, s"),
         "time_stamps" => (false, "error of the time stamps, s"),

@@ -58,6 +58,37 @@ fn clean_columns_have_no_finding_whatever_their_noise_and_steps() {
 }
 
 #[test]
+fn rows_of_zeros_are_found_between_others_and_not_at_rest() {
+    let mut mixed = recording(0.0, 0.3);
+    for row in (7..STEPS).step_by(10) {
+        (mixed.joints[0].position_rad[row], mixed.joints[0].torque_nm[row]) = (0.0, 0.0);
+    }
+    let screened = found(&mixed);
+    let zeros = screened.findings.iter().find(|finding| finding.name == ZERO_ROWS).expect("found");
+    assert!(zeros.refuses && zeros.text.contains("10.0 % of the rows"), "{}", zeros.text);
+    // A leg that rests at zero before and after its motion, with its drive off.
+    let mut resting = recording(0.0, 0.3);
+    for row in (0..500).chain(STEPS - 500..STEPS) {
+        (resting.joints[0].position_rad[row], resting.joints[0].torque_nm[row]) = (0.0, 0.0);
+    }
+    assert!(found(&resting).findings.iter().all(|finding| finding.name != ZERO_ROWS));
+}
+
+#[test]
+fn a_limit_is_found_though_an_exact_angle_rests() {
+    let mut resting = recording(0.0, 0.3);
+    let series = &mut resting.joints[0];
+    // Every half second the joint sticks for 30 ms, wherever it is.
+    for start in (100..STEPS - 20).step_by(250) {
+        let angle = series.position_rad[start];
+        series.position_rad[start..start + 15].fill(angle);
+    }
+    series.torque_nm.iter_mut().for_each(|torque| *torque = torque.min(7.0));
+    let screened = found(&resting);
+    assert!(screened.findings.iter().any(|finding| finding.name == SATURATION), "{:?}", screened.findings);
+}
+
+#[test]
 fn coarse_angles_interpolated_to_another_clock_are_neither_held_nor_frozen() {
     // Slow enough that the angle repeats itself for up to 30 ms between two counts.
     let mut coarse = recording(0.0, 0.3);
