@@ -18,7 +18,7 @@ create_exception!(
 );
 
 /// Options whose argument has another name; `--even-stamps` becomes `even_stamps` without an entry.
-const ARGUMENTS: [(&str, &str); 7] = [
+const ARGUMENTS: [(&str, &str); 8] = [
     ("--torque-delay", "torque_delay_ms"),
     ("--bandwidth", "bandwidth_hz"),
     ("--accept-error", "accept_error_percent"),

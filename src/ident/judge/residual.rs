@@ -15,7 +15,7 @@
 //! Neighbouring blocks share only the noise that the filter's reach carries across (0.12 s at 16 Hz). The
 //! mean product of neighbours is therefore free of noise and needs no noise level. Source: lag-one
 //! autocovariance of block means; its spread after Bartlett (1946).
-//! Cost: B multiplications for each joint and row. Memory: 13 numbers for each joint. Known limits: a
+//! Cost: B multiplications for each joint and row. Memory: 11 numbers for each joint. Known limits: a
 //! residual that changes sign within half a second, as friction's does at fast reversals, does not show.
 
 use crate::ident::record::recorder::LARGEST_STILL_SHARE;
@@ -35,19 +35,17 @@ const LARGEST_OUTLIER_PART: u64 = 3;
 struct Neighbours<T> {
     pairs: u32,
     products: T,
-    squares: T,
     before: Option<T>,
 }
 
 impl<T: Real> Neighbours<T> {
     fn new() -> Self {
-        Self { pairs: 0, products: T::zero(), squares: T::zero(), before: None }
+        Self { pairs: 0, products: T::zero(), before: None }
     }
 
     fn take(&mut self, mean: Option<T>) {
         if let (Some(before), Some(mean)) = (self.before, mean) {
             self.products += before * mean;
-            self.squares += T::from_double(0.5) * (before * before + mean * mean);
             self.pairs = self.pairs.saturating_add(1);
         }
         self.before = mean;

@@ -105,7 +105,7 @@ pub struct StoredJoint {
 pub struct Conditions {
     /// `simulation` or `recording`.
     pub(crate) source: String,
-    /// Always `accepted`.
+    /// `accepted` or `accepted_with_misfit`.
     pub(crate) verdict: String,
     /// `relative` to the assumed torque constants, or `absolute`: identified from a known mass.
     pub scale: String,

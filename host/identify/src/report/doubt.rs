@@ -155,6 +155,11 @@ pub(crate) struct DirectionReport {
     pub(crate) explained_limit: Number,
     /// Largest shift of a parameter, in its sigma, when the direction is fitted.
     pub(crate) largest_shift: Number,
+    /// Torque of a spring that the parameters leave, or of a drift at the ends of a recording, over the rms
+    /// torque; `null` for other directions.
+    pub(crate) torque_share: Number,
+    /// Share from which a drift refuses; `null` for other directions.
+    pub(crate) accepted_share: Number,
     /// False where the recording is refused for this direction.
     pub(crate) passed: bool,
     /// Directions and parameters that cannot be distinguished from this one.
@@ -164,7 +169,7 @@ pub(crate) struct DirectionReport {
 /// A fault in a recording's columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SampleFinding {
-    /// `saturation`, `held_samples`, `quantised` or `time_stamps`.
+    /// `saturation`, `held_samples`, `zero_rows`, `quantised` or `time_stamps`.
     pub(crate) name: &'static str,
     /// File, as named.
     pub(crate) file: String,
@@ -250,11 +255,21 @@ impl DirectionReport {
         let failure = (!self.passed).then(|| {
             let limit =
                 self.limit.known().map_or(String::new(), |limit| format!(", limit {limit:.3} {}", self.unit));
+            let effect = match [self.torque_share, self.accepted_share].map(|share| share.known()) {
+                [Some(share), Some(accepted)] => format!(
+                    "makes {:.1} % of the rms torque at the ends, accepted {:.1} %",
+                    100.0 * share,
+                    100.0 * accepted
+                ),
+                _ => format!(
+                    "moves a parameter by {:.1} sigma",
+                    self.largest_shift.known().unwrap_or(f64::NAN)
+                ),
+            };
             format!(
-                "{}{limit}; it explains {:.0} % of the misfit and moves a parameter by {:.1} sigma",
+                "{}{limit}; it explains {:.0} % of the misfit and {effect}",
                 self.words(),
                 100.0 * self.explained.known().unwrap_or(f64::NAN),
-                self.largest_shift.known().unwrap_or(f64::NAN),
             )
         });
         FindingReport::judged("residual", self.name, self.joint, [self.value, self.limit], failure)

@@ -40,7 +40,7 @@ pub const REFUSED: Word = "refused";
 /// Misfit over noise up to which noise explains the misfit, so that limits follow from the noise.
 pub(crate) const EXPLAINED_BY_NOISE: f64 = 1.3;
 /// Error of a torque, percent of its rms, that counts as none: exact data keep the filter's and the clock's.
-const NEGLIGIBLE_PERCENT: f64 = 0.5;
+pub(crate) const NEGLIGIBLE_PERCENT: f64 = 0.5;
 
 /// One of a joint's fourteen parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -399,7 +399,8 @@ impl RunReport {
         self.reasons.is_empty()
     }
 
-    /// Largest misfit over noise of a result that is accepted although noise does not explain it.
+    /// Largest misfit over noise of a result that is accepted although noise does not explain it; infinite
+    /// where the noise is unknown.
     pub fn accepted_misfit(&self) -> Option<f64> {
         (self.verdict == ACCEPTED_WITH_MISFIT).then(|| self.unexplained_misfit())?
     }
@@ -412,7 +413,8 @@ impl RunReport {
             fits.filter_map(|fit| fit.percent_of_rms.known()).all(|error| error <= NEGLIGIBLE_PERCENT)
         };
         let unexplained = ratios.iter().enumerate().filter_map(|(joint, ratio)| {
-            ratio.known().filter(|ratio| *ratio > EXPLAINED_BY_NOISE && !is_negligible(joint))
+            let ratio = ratio.known().unwrap_or(f64::INFINITY);
+            (ratio > EXPLAINED_BY_NOISE && !is_negligible(joint)).then_some(ratio)
         });
         unexplained.reduce(f64::max)
     }

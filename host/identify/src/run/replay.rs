@@ -21,6 +21,7 @@ use scarab::model::{AnatomicalJoint, Payload};
 use scarab_base::error::ToolError;
 
 use crate::formats::leg_file::LegFile;
+use crate::formats::leg_file::check::ACCEPTED_PERCENT;
 use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::Read;
 use crate::formats::recording::import::Import;
@@ -113,8 +114,8 @@ impl ReplayOptions {
         if self.split.is_some_and(|share| !(share > 0.0 && share < 1.0)) {
             return refused("--split: must be above 0 and below 1");
         }
-        if !(0.0..=100.0).contains(&self.accept_error_percent) {
-            return refused("--accept-error: must be 0 to 100 percent of the rms torque");
+        if !ACCEPTED_PERCENT.contains(&self.accept_error_percent) {
+            return refused("--accept-error: must be 0 to 70 percent of the rms torque");
         }
         if self.split.is_some() && !held_out.is_empty() {
             return refused("--split and --validate exclude each other");

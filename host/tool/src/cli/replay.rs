@@ -41,8 +41,9 @@ pub(crate) struct ReplayArguments {
     /// 8. `auto`: the largest up to 16 Hz at which the encoders' steps are negligible.
     #[arg(long, value_name = "HZ|auto", allow_negative_numbers = true, help_heading = "Identification")]
     bandwidth: Option<Bandwidth>,
-    /// Error of a held-out torque that is accepted beside noise, percent of its rms, 0 to 100. Default: that
-    /// of the leg file, else 5.
+    /// Error of a held-out torque that is accepted beside noise, percent of its rms, 0 to 70. Default: that
+    /// of the leg file, else 5. Where noise does not explain the misfit, the error may also be at most twice
+    /// that of the training part plus 5 %.
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true, help_heading = "Identification")]
     accept_error: Option<f64>,
     /// Remove this delay of the torque against the angle, ms: one value, or one for each joint, by comma.

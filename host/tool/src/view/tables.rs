@@ -382,6 +382,15 @@ pub(crate) fn explanation(reason: &str) -> &'static str {
     }
 }
 
+/// Misfit over noise in words.
+pub fn misfit(ratio: f64) -> String {
+    if ratio.is_finite() {
+        format!("a misfit of {ratio:.1} times the noise")
+    } else {
+        "a misfit beside unknown noise".into()
+    }
+}
+
 /// Verdict in words.
 pub fn verdict_line(run: &RunReport) -> String {
     let seconds = if run.simulated_s > 0.0 && run.wall_s > 0.0 {
@@ -390,9 +399,7 @@ pub fn verdict_line(run: &RunReport) -> String {
         String::new()
     };
     if run.accepted() {
-        let misfit = run
-            .accepted_misfit()
-            .map_or(String::new(), |ratio| format!(", with a misfit of {ratio:.1} times the noise"));
+        let misfit = run.accepted_misfit().map_or(String::new(), |ratio| format!(", with {}", misfit(ratio)));
         let validated = if run.validated { "" } else { ", not validated" };
         format!("verdict: accepted{misfit}{validated}{seconds}")
     } else {

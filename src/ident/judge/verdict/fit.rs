@@ -68,8 +68,8 @@ impl<T: Real> Thresholds<T> {
         uncertain: T,
     ) -> T {
         let (noise, error) = (training.filtered_noise(joint), training.torque_error(joint, values));
-        let share = match (noise, error) {
-            (Some(noise), Some(error)) if error > noise => noise / error,
+        let share = match (noise.unwrap_or(T::zero()), error) {
+            (noise, Some(error)) if error > noise => noise / error,
             _ => T::one(),
         };
         self.uncertainty_sigmas * share * uncertain

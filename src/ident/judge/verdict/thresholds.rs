@@ -36,8 +36,8 @@ pub struct Thresholds<T> {
     /// [`Self::largest_error_ratio`].
     pub error_margin_share: T,
     /// Largest error on a held-out motion over that on the training motion; two allows for friction that
-    /// depends on speed and load. Infinite where noise explains the training error: limits then follow from
-    /// the noise.
+    /// depends on speed and load. Infinite by default: limits follow from the noise. A replay sets it where
+    /// noise does not explain the training error.
     pub largest_error_ratio: T,
     /// Whether held-out blocks with outliers are left out of the slow residual. Where noise does not explain
     /// the training error, the bound of an outlier is unknown.

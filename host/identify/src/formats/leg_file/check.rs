@@ -89,6 +89,9 @@ pub(super) fn joint_steps(number: usize) -> Vec<Step> {
     vec![Step::Key("joint"), Step::Entry(number)]
 }
 
+/// Errors that can be accepted, percent of the rms torque: at 70 a model explains half of the torque's power.
+pub(crate) const ACCEPTED_PERCENT: std::ops::RangeInclusive<f64> = 0.0..=70.0;
+
 pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
     let top = KeyLocation { joint: None, table: None };
     top.named("name", &leg.name)?;
@@ -98,7 +101,12 @@ pub(super) fn leg(leg: &LegFile) -> Result<(), Fault> {
     top.within("torque_noise_percent", leg.torque_noise_percent, 0.0, 100.0)?;
     // Above 25 Hz the rows at 50 Hz would be independent, and noise would alias into them.
     top.within("bandwidth_hz", leg.bandwidth_hz, 1.0, 25.0)?;
-    top.within("accept_error_percent", leg.accept_error_percent, 0.0, 100.0)?;
+    top.within(
+        "accept_error_percent",
+        leg.accept_error_percent,
+        *ACCEPTED_PERCENT.start(),
+        *ACCEPTED_PERCENT.end(),
+    )?;
     if let Some(celsius) = leg.temperature_c {
         let (low, high) = crate::formats::temperature::RANGE_C;
         top.within("temperature_c", celsius, low, high)?;

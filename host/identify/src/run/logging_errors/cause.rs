@@ -47,6 +47,8 @@ const SMALL_MISFIT: f64 = 0.2;
 /// Misfits closer than this ratio are those of mirrored legs.
 const MIRRORED: f64 = 1.001;
 
+/// Scale between joints, percent, from which a torque is not in mN m.
+const OTHER_SCALE_PERCENT: f64 = 40.0;
 /// Share of its largest value at which a torque counts as zero, and how often one without sign returns there.
 const NEAR_ZERO: f64 = 0.02;
 const LEAST_RETURNS: usize = 3;
@@ -194,12 +196,17 @@ fn beyond_unit<const N: usize, const B: usize>(question: &Question<N, B>, cause:
     };
     let errors = LoggingErrors::fit(&smaller).ok().flatten();
     let mut other = errors.iter().flat_map(|errors| &errors.directions);
-    let Some(scale) = other.find(|found| !found.passed && found.name == "torque_scale") else {
+    let is_other = |found: &&DirectionReport| {
+        found.name == "torque_scale"
+            && !found.passed
+            && found.value.known().is_some_and(|size| size.abs() > OTHER_SCALE_PERCENT)
+    };
+    let Some(scale) = other.find(is_other) else {
         return cause;
     };
     CauseReport {
         words: format!(
-            "is the torque in per mille of each motor's rated torque (CiA 402, object 6077)? In mN m, {}",
+            "is the torque in per mille of each motor's rated torque (CiA 402, object 6077)? Read in mN m, {}",
             scale.words()
         ),
         reads: Vec::new(),
@@ -331,8 +338,8 @@ fn excluded(samples: &[SampleFinding]) -> Option<CauseReport> {
 fn unknown() -> CauseReport {
     CauseReport {
         name: "unknown",
-        words: "no correction of units and no single one of signs, columns, delay, scale or gravity makes the recording \
-                acceptable"
+        words: "no correction of units and no single one of signs, columns, delay, scale, gravity, spring or drift makes the \
+                recording acceptable"
             .into(),
         ..CauseReport::default()
     }

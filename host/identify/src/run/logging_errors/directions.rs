@@ -193,8 +193,9 @@ pub(crate) struct Found<const B: usize> {
     /// Directions that cannot be distinguished from this one.
     pub(crate) alike: Vec<String>,
     column: Vec<f64>,
-    /// What drifts over the rms torque of its joint, root mean square at value one.
-    share: f64,
+    /// Root mean square of the torque of a spring that the parameters leave, or of a drift at the ends of the
+    /// recording, over that of its joint; zero for other kinds.
+    pub(crate) torque_share: f64,
 }
 
 impl<const B: usize> Found<B> {
@@ -216,11 +217,6 @@ impl<const B: usize> Found<B> {
     /// Share of the misfit that the direction explains.
     pub(crate) fn explained(&self) -> f64 {
         if self.seen { ((self.cost.0 - self.cost.1) / self.cost.0).max(0.0) } else { 0.0 }
-    }
-
-    /// Torque of a drift at the ends of a recording over the rms torque of its joint; `None` for others.
-    pub(crate) fn end_share(&self) -> Option<f64> {
-        matches!(self.kind, Kind::Drift(..)).then_some(0.5 * self.value.abs() * self.share)
     }
 
     /// Variance that a possible error adds to each parameter: the shift, reduced by the part that chance
@@ -523,26 +519,34 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
             ),
             values: fit.values,
             alike: Vec::new(),
+            torque_share: value.abs() * self.torque_share(kind, &fit.values, &score),
             column: score.column,
-            share: self.share(kind, &fit.values),
         }
     }
 
-    /// What drifts over the rms torque of its joint, root mean square; zero for other kinds.
-    fn share(&self, kind: Kind, parameters: &[f64; B]) -> f64 {
-        let Kind::Drift(_, joint) = kind else { return 0.0 };
+    /// Torque of a spring or a drift of value one over that of its joint, root mean squares.
+    fn torque_share(&self, kind: Kind, parameters: &[f64; B], score: &Score) -> f64 {
         let all = self.equations;
-        let (mut drifting, mut torque) = (0.0, 0.0);
-        for ((beside, measured), source) in
-            self.beside(kind, parameters).iter().zip(&all.torque).zip(&all.sources)
-        {
+        let (beside, joint): (Vec<f64>, usize) = match kind {
+            Kind::Spring(joint) => {
+                let left = score.column.iter().zip(&all.weight);
+                (left.map(|(column, weight)| column / weight.max(1e-300)).collect(), joint)
+            }
+            // At the ends s is a half; its root mean square over the recording is 1 / sqrt 12.
+            Kind::Drift(_, joint) => {
+                let drifting = self.beside(kind, parameters);
+                (drifting.into_iter().map(|torque| 0.5 * 12_f64.sqrt() * torque).collect(), joint)
+            }
+            _ => return 0.0,
+        };
+        let (mut own, mut torque) = (0.0, 0.0);
+        for ((beside, measured), source) in beside.iter().zip(&all.torque).zip(&all.sources) {
             if source.joint == joint {
-                drifting += beside * beside;
+                own += beside * beside;
                 torque += measured * measured;
             }
         }
-        // The mean square of s itself is a twelfth.
-        (12.0 * drifting / torque.max(1e-300)).sqrt()
+        (own / torque.max(1e-300)).sqrt()
     }
 }
 

@@ -303,6 +303,7 @@ impl<const N: usize> Encoders<N> {
         let grid = Resampled::new(&recording);
         Motion {
             training_s: training_s - grid.start_s,
+            within_s: [0.0, grid.len() as f64 / SAMPLE_RATE_HZ],
             position: (0..grid.len()).filter_map(|point| grid.position_rad::<N>(point)).collect(),
             torque: (0..grid.len()).filter_map(|point| grid.torque_nm::<N>(point)).collect(),
         }

@@ -243,7 +243,7 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
         let parameters = sigma.map(|sigma| sigma.total());
         let directions: Vec<DirectionReport> = found
             .iter()
-            .map(|found| DirectionReport::new(found, &parameters, systematic, question.accepted_error))
+            .map(|found| DirectionReport::new(found, &parameters, systematic, question))
             .collect();
         for (found, _) in found.iter().zip(&directions).filter(|(_, report)| report.passed) {
             for (sigma, variance) in sigma.iter_mut().zip(found.variance()) {

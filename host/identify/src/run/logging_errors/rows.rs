@@ -43,6 +43,8 @@ const ROWS_PER_PARAMETER: usize = 5;
 pub struct Motion<const N: usize> {
     /// Duration of its training part from the start, s; infinite for a training file.
     pub(crate) training_s: f64,
+    /// Start in its recording and duration of the recording, s.
+    pub(crate) within_s: [f64; 2],
     /// Chain angles, rad.
     pub(crate) position: Vec<[f64; N]>,
     /// Chain torques, N m.
@@ -78,6 +80,7 @@ struct Part<const N: usize> {
     /// Grid point of the first row's centre.
     first: usize,
     training_s: f64,
+    within_s: [f64; 2],
 }
 
 impl<const N: usize> Part<N> {
@@ -117,6 +120,7 @@ impl<const N: usize> Part<N> {
             filtered,
             first: reach + low_pass.reach(),
             training_s: motion.training_s,
+            within_s: motion.within_s,
         }
     }
 
@@ -167,12 +171,12 @@ pub(crate) struct RowSource {
     pub(crate) training: bool,
     /// Segment of at most two seconds.
     pub(crate) cluster: usize,
-    /// Time from the start of its motion, as a share of the motion's duration.
+    /// Time from the start of its recording, as a share of the recording's duration.
     pub(crate) share: f64,
 }
 
 impl RowSource {
-    /// Time of a drift: from -0.5 at the start of the motion to 0.5 at its end.
+    /// Time of a drift: from -0.5 at the start of the recording to 0.5 at its end.
     pub(crate) fn drift(&self) -> f64 {
         self.share - 0.5
     }
@@ -272,7 +276,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
                         joint,
                         training: time_s < part.training_s,
                         cluster,
-                        share: time_s / (count * row_s + 2.0 * start_s),
+                        share: (part.within_s[0] + time_s) / part.within_s[1],
                     });
                     self.columns.push(filtered.regressor[joint]);
                     self.torque.push(filtered.torque[joint]);

@@ -71,6 +71,8 @@ const JUMP_RAD: f64 = 0.05;
 /// Most rows of zeros in a row, and fewest such gaps that are no accident.
 const LONGEST_GAP: usize = 10;
 const LEAST_GAPS: usize = 3;
+/// Share of rows of zeros from which a recording is refused; fewer are replaced as outliers.
+const LARGEST_ZERO_SHARE: f64 = 0.005;
 /// Largest lost share of a recording: beyond it the rest is a biased choice, as with disturbed rows.
 const LARGEST_LOSS: f64 = 1.0 / 3.0;
 /// Least number of levels from which a column shows the step between them.
@@ -309,15 +311,15 @@ impl<'a> Examination<'a> {
         };
         let gaps: Vec<Range<usize>> = runs(&rows).filter(is_apart).collect();
         let first = gaps.first().filter(|_| gaps.len() >= LEAST_GAPS)?;
-        let share = count(&rows) / rows.len() as f64;
+        let share = gaps.iter().map(Range::len).sum::<usize>() as f64 / rows.len() as f64;
         let time_s = self.recording.time_s[first.start];
         let text = format!(
-            "{:.1} % of the rows are zero in every column, first at {time_s:.3} s: does another program publish on the \
-             same topic? Remove these rows",
+            "{:.2} % of the rows are zero in every column between rows that are not, first at {time_s:.3} s: does another \
+             program publish on the same topic, or are messages lost? Remove these rows",
             100.0 * share
         );
         let finding = self.finding(ZERO_ROWS, None, text);
-        Some(SampleFinding { value: time_s, share, refuses: true, ..finding })
+        Some(SampleFinding { value: time_s, share, refuses: share > LARGEST_ZERO_SHARE, ..finding })
     }
 
     /// Stretches in which a column is constant while the leg moves.

@@ -71,7 +71,8 @@ fn motion_of(model: &RowModel<f64, 2, COLUMNS>, late_s: [f64; 2], seed: u64) -> 
     let torque = |joint: usize, time_s: f64| -> f64 {
         model.rows(&instant(time_s)).regressor[joint].iter().zip(&values).map(|(y, p)| y * p).sum()
     };
-    let mut motion = Motion { training_s: f64::INFINITY, position: Vec::new(), torque: Vec::new() };
+    let mut motion =
+        Motion { training_s: f64::INFINITY, within_s: [0.0, 20.0], position: Vec::new(), torque: Vec::new() };
     for sample in 0..10_000 {
         let time_s = f64::from(sample) / 500.0;
         motion.position.push(instant(time_s).position);
@@ -338,6 +339,22 @@ fn what_drifts_is_found_at_its_size_and_refused_beyond_the_accepted_error() {
         let cause = cause_of(&question);
         assert_eq!((cause.name, cause.joint), (name, Some(1)), "{}", cause.words);
     }
+    // An excluded stretch cuts a recording in two; the drift goes on.
+    let whole = drifting(|share, _, _| 6.0 * share).motions.remove(0);
+    let piece = |from: usize, to: usize| Motion {
+        within_s: [from as f64 / 500.0, 20.0],
+        position: whole.position[from..to].to_vec(),
+        torque: whole.torque[from..to].to_vec(),
+        ..whole.clone()
+    };
+    let found = errors(&question(vec![piece(0, 4_900), piece(5_100, 10_000)]));
+    let (value, sigma) = estimate(&found, "offset_drift", Some(1));
+    assert!((value - 6.0).abs() < 4.0 * sigma, "{value} +- {sigma}");
+    // A joint that counts backwards: the drift is that of the logged torque.
+    let mut reversed = drifting(|share, _, _| 6.0 * share);
+    reversed.anatomy[0] = AnatomicalJoint::new(-1, 0.0).expect("a direction");
+    let (value, _) = estimate(&errors(&reversed), "offset_drift", Some(1));
+    assert!(value < -5.0, "{value}");
     // A smaller drift, within the accepted error, is seen and not refused.
     let found = errors(&drifting(|share, _, _| 1.5 * share));
     let (value, sigma) = estimate(&found, "offset_drift", Some(1));

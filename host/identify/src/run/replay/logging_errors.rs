@@ -76,6 +76,7 @@ fn motions<const N: usize>(
         };
         let motion = |points: Range<usize>| Motion {
             training_s: whole.training_s - points.start as f64 * GRID_S,
+            within_s: [points.start as f64 * GRID_S, grid.len() as f64 * GRID_S],
             position: points
                 .clone()
                 .filter_map(|point| grid.position_rad::<N>(point))

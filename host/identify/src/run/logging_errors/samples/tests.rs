@@ -65,7 +65,13 @@ fn rows_of_zeros_are_found_between_others_and_not_at_rest() {
     }
     let screened = found(&mixed);
     let zeros = screened.findings.iter().find(|finding| finding.name == ZERO_ROWS).expect("found");
-    assert!(zeros.refuses && zeros.text.contains("10.0 % of the rows"), "{}", zeros.text);
+    assert!(zeros.refuses && (0.08..=0.1).contains(&zeros.share), "{}", zeros.text);
+    // A few lost messages in ten thousand are reported only.
+    let mut lost = recording(0.0, 0.3);
+    for row in [1_000, 2_000, 3_000, 4_000, 5_000] {
+        (lost.joints[0].position_rad[row], lost.joints[0].torque_nm[row]) = (0.0, 0.0);
+    }
+    assert!(found(&lost).findings.iter().all(|finding| !finding.refuses));
     // A leg that rests at zero before and after its motion, with its drive off.
     let mut resting = recording(0.0, 0.3);
     for row in (0..500).chain(STEPS - 500..STEPS) {
