@@ -26,7 +26,7 @@ pub(crate) fn banner(run: &RunReport) -> Markup {
                     @for words in untested_lengths(&run.findings) { p { strong { "Hardly tested: " } (words) "." } }
                 }
                 @if let Some(ratio) = misfit {
-                    p.warning { strong { "Misfit: " } (tables::misfit(ratio)) ". The torque holds something that the model does not, \
+                    p.warning { strong { "Warning: " } (tables::misfit(ratio)) ". The torque holds something that the model does not, \
                         within the accepted error. The standard deviations contain its scatter, not a constant part that no \
                         error of the list below describes." }
                 }
