@@ -371,7 +371,9 @@ pub(crate) fn explanation(reason: &str) -> &'static str {
         }
         "unexcited" => "a joint hardly moved, or the motion does not distinguish the parameters",
         "residual" => "the residual of the model is not noise",
-        "validation" => "the held-out torque is predicted worse than the training fit permits, or not at all",
+        "validation" => {
+            "the held-out torque is predicted worse than noise and the accepted error permit, or not at all"
+        }
         "not_a_measurement" => "the torque was computed, not measured",
         "outliers" => "too many outliers",
         "contact" => "the leg touched something",
