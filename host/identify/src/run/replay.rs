@@ -191,7 +191,7 @@ fn identified<const N: usize, const B: usize>(
     let recorder = Box::new(new_recorder(options.bandwidth_hz)?);
     let ratios = scale.map_or([1.0; N], |scale| scale.map(|found| f64::from(found.ratio)));
     let parts = parts(recordings, options, leg, &ratios)?;
-    let encoders: Encoders<N> = encoders(&parts.wholes, leg);
+    let encoders = encoders(&parts.wholes, leg);
     encoders.describe(leg, options.bandwidth_hz, &mut background.model);
     encoders.describe(leg, options.bandwidth_hz, &mut background.device);
     let noise = [&parts.training, &parts.held_out].map(|part| noise_density::<N>(part, options.bandwidth_hz));
@@ -280,7 +280,7 @@ fn report<const N: usize, const B: usize>(
 fn bandwidths<const N: usize, const B: usize>(
     leg: &LegFile,
     background: &Background<N, B>,
-    encoders: &Encoders<N>,
+    encoders: &Encoders,
     recordings: &Recordings,
     options: &ReplayOptions,
     is_explained: bool,

@@ -11,12 +11,13 @@
 //! makes another leg, which fits, so most of it shows only beside the other tests. Cost: some thirty fits.
 
 use nalgebra::Vector3;
-use scarab::ident::{RowModel, Smoothed};
 
 use crate::report::doubt::CauseReport;
 use crate::run::logging_errors::Refitted;
 use crate::run::logging_errors::lag::least;
+use crate::run::logging_errors::regressor::Instant;
 use crate::run::logging_errors::rows::Equations;
+use crate::run::logging_errors::table::Table;
 
 /// Rates of a clock that are tried first.
 const RATES: [f64; 12] = [0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 2.5, 3.3, 5.0];
@@ -24,11 +25,8 @@ const RATES: [f64; 12] = [0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 2.5, 3.
 const SAME_RATE: f64 = 0.02;
 
 /// All assumptions, each replaced alone.
-pub(crate) fn all<const N: usize, const B: usize>(
-    equations: &Equations<N, B>,
-    zero: &[f64; N],
-) -> Vec<Refitted<B>> {
-    let weightless = RowModel { gravity: Vector3::zeros(), ..equations.model().clone() };
+pub(crate) fn all(equations: &Equations, zero: &[f64]) -> Vec<Refitted> {
+    let weightless = equations.regressor.with_gravity(&|_| Vector3::zeros());
     let no_gravity = CauseReport {
         name: "no_gravity",
         words:
@@ -36,8 +34,8 @@ pub(crate) fn all<const N: usize, const B: usize>(
                 .into(),
         ..CauseReport::default()
     };
-    let mut found = vec![replaced(equations, no_gravity, equations.columns_of(&weightless, &|_| {}))];
-    found.extend((1..N).map(|joint| {
+    let mut found = vec![replaced(equations, no_gravity, equations.columns_of(&*weightless, &|_| {}))];
+    found.extend((1..equations.joints()).map(|joint| {
         let cause = CauseReport {
             name: "absolute_angle",
             joint: Some(joint + 1),
@@ -47,14 +45,14 @@ pub(crate) fn all<const N: usize, const B: usize>(
             ),
             ..CauseReport::default()
         };
-        replaced(equations, cause, equations.columns_of(equations.model(), &|instant| relative(instant, joint, zero)))
+        replaced(equations, cause, equations.columns_of(&*equations.regressor, &|instant| relative(instant, joint, zero)))
     }));
     found.extend(clock(equations));
     found
 }
 
 /// Makes the absolute angle of a joint relative to the link before it, for parallel axes.
-fn relative<const N: usize>(instant: &mut Smoothed<f64, N>, joint: usize, zero: &[f64; N]) {
+fn relative(instant: &mut Instant, joint: usize, zero: &[f64]) {
     for before in 0..joint {
         instant.position[joint] -= instant.position[before] - zero[before];
         instant.velocity[joint] -= instant.velocity[before];
@@ -63,13 +61,11 @@ fn relative<const N: usize>(instant: &mut Smoothed<f64, N>, joint: usize, zero: 
 }
 
 /// The rate of the clock that fits best, unless it is the stated one.
-fn clock<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Option<Refitted<B>> {
+fn clock(equations: &Equations) -> Option<Refitted> {
     let columns = |rate: f64| {
-        equations.columns_of(equations.model(), &|instant| {
-            for joint in 0..N {
-                instant.velocity[joint] /= rate;
-                instant.acceleration[joint] /= rate * rate;
-            }
+        equations.columns_of(&*equations.regressor, &|instant| {
+            instant.velocity.iter_mut().for_each(|speed| *speed /= rate);
+            instant.acceleration.iter_mut().for_each(|acceleration| *acceleration /= rate * rate);
         })
     };
     let cost = |rate: f64| equations.fit(&columns(rate), &equations.torque, false).cost;
@@ -88,11 +84,7 @@ fn clock<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Option<
     ((rate - 1.0).abs() > SAME_RATE).then(|| replaced(equations, cause, columns(rate)))
 }
 
-fn replaced<const N: usize, const B: usize>(
-    equations: &Equations<N, B>,
-    cause: CauseReport,
-    columns: Vec<[f64; B]>,
-) -> Refitted<B> {
+fn replaced(equations: &Equations, cause: CauseReport, columns: Table) -> Refitted {
     let torque = equations.torque.clone();
     let plain = equations.fit(&equations.columns, &torque, false).cost;
     let fit = equations.fit(&columns, &torque, false);

@@ -14,6 +14,8 @@
 //! significant, and off by no more than its linear estimate can tell.
 
 use scarab::ident::Test;
+use scarab::model::AnatomicalJoint;
+use scarab::real::dot;
 
 use crate::report::doubt::{CauseReport, DirectionReport, ReadAs, SampleFinding};
 use crate::report::findings::{FindingReport, is_small};
@@ -24,6 +26,7 @@ use crate::run::logging_errors::lag;
 use crate::run::logging_errors::midway::Midway;
 use crate::run::logging_errors::rows::{Equations, Motion};
 use crate::run::logging_errors::samples::SATURATION;
+use crate::run::logging_errors::table::Table;
 use crate::run::logging_errors::{
     LoggingErrors, Question, Refitted, joint_words, midway_words, sample_cause,
 };
@@ -56,15 +59,15 @@ const LEAST_RETURNS: usize = 3;
 const COUPLED_DRIVE: &str = "coupled_drive";
 
 /// Change of the angles and torques of one instant.
-type Change<const N: usize> = Box<dyn Fn(&mut [f64; N], &mut [f64; N])>;
+type Change = Box<dyn Fn(&mut [f64], &mut [f64])>;
 
 /// A correction of the samples: angles and torques of one instant, anatomical.
-struct Correction<const N: usize> {
+struct Correction {
     name: &'static str,
     joint: Option<usize>,
     words: String,
     reads: Vec<ReadAs>,
-    apply: Change<N>,
+    apply: Change,
 }
 
 /// Quality of a fit.
@@ -83,9 +86,9 @@ struct Tried {
 }
 
 /// Names the most likely cause of a refusal.
-pub(crate) fn likely<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    errors: Option<&LoggingErrors<N, B>>,
+pub(crate) fn likely(
+    question: &Question,
+    errors: Option<&LoggingErrors>,
     samples: &[SampleFinding],
     findings: &[FindingReport],
 ) -> CauseReport {
@@ -158,10 +161,10 @@ pub(crate) fn likely<const N: usize, const B: usize>(
 }
 
 /// A torque that comes back to zero again and again and never crosses it, as a magnitude does.
-fn unsigned<const N: usize, const B: usize>(question: &Question<N, B>) -> Option<CauseReport> {
-    let joint = (0..N).find(|&joint| {
+fn unsigned(question: &Question) -> Option<CauseReport> {
+    let joint = (0..question.joints()).find(|&joint| {
         let torques: Vec<f64> =
-            question.motions.iter().flat_map(|motion| &motion.torque).map(|all| all[joint]).collect();
+            question.motions.iter().flat_map(|motion| motion.torque.column(joint)).collect();
         let [low, high] = [f64::min, f64::max].map(|of| torques.iter().copied().fold(0.0, of));
         // Resampling swings over at a corner.
         let zero = NEAR_ZERO * (high - low);
@@ -181,18 +184,17 @@ fn unsigned<const N: usize, const B: usize>(question: &Question<N, B>) -> Option
 }
 
 /// A torque in mN m whose scales then differ between the joints is in another unit: a motor's own.
-fn beyond_unit<const N: usize, const B: usize>(question: &Question<N, B>, cause: CauseReport) -> CauseReport {
+fn beyond_unit(question: &Question, cause: CauseReport) -> CauseReport {
     if cause.reads != [ReadAs::MillinewtonMetres] {
         return cause;
     }
     let correction = millinewton_metres();
     let motions = question.motions.iter().map(|motion| corrected(question, motion, &correction)).collect();
     let smaller = Question {
-        model: question.model.clone(),
         motions,
-        noise: question.noise.map(|density| Some(density? / 1e6)),
-        sigma: question.sigma.map(|sigma| sigma / 1e3),
-        ..*question
+        noise: question.noise.iter().map(|density| Some((*density)? / 1e6)).collect(),
+        sigma: question.sigma.iter().map(|sigma| sigma / 1e3).collect(),
+        ..question.clone()
     };
     let errors = LoggingErrors::fit(&smaller).ok().flatten();
     let mut other = errors.iter().flat_map(|errors| &errors.directions);
@@ -240,12 +242,12 @@ fn motionless(findings: &[FindingReport]) -> Option<CauseReport> {
 
 /// Encoder steps as the cause: where nothing else refuses, or where a lower bandwidth makes the recording
 /// acceptable.
-fn encoder_steps<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    errors: &LoggingErrors<N, B>,
+fn encoder_steps(
+    question: &Question,
+    errors: &LoggingErrors,
     findings: &[FindingReport],
 ) -> Option<CauseReport> {
-    let bias = errors.encoder?;
+    let bias = errors.encoder.as_ref()?;
     let mut failed = findings.iter().filter(|finding| !finding.passed);
     let words = if let Some(steps) = failed.clone().find(|finding| finding.test == "encoder_steps")
         && failed.all(|finding| finding.test == "encoder_steps")
@@ -257,7 +259,7 @@ fn encoder_steps<const N: usize, const B: usize>(
         let errors = LoggingErrors::fit(&calmer).ok()??;
         let is_right = errors.directions.iter().all(|direction| direction.passed)
             && !errors.midway.as_ref().is_some_and(Midway::refuses)
-            && !errors.encoder.is_some_and(|bias| bias.refuses())
+            && !errors.encoder.as_ref().is_some_and(|bias| bias.refuses())
             && quality(&calmer, &errors.equations, &power(&errors.equations)).sound;
         if !is_right {
             return None;
@@ -276,10 +278,7 @@ fn encoder_steps<const N: usize, const B: usize>(
 
 /// A joint, or all, whose angle is in degrees. It spans more than two turns; read as degrees it leaves less
 /// than half of the misfit and a plausible leg.
-pub(crate) fn in_degrees<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    errors: &LoggingErrors<N, B>,
-) -> Option<CauseReport> {
+pub(crate) fn in_degrees(question: &Question, errors: &LoggingErrors) -> Option<CauseReport> {
     let power = power(&errors.equations);
     let here = quality(question, &errors.equations, &power);
     let candidates = angle_units(question).into_iter().chain(unit_pairs(question)).filter(|correction| {
@@ -315,11 +314,7 @@ fn nearest(mut passing: Vec<Tried>) -> Option<CauseReport> {
 }
 
 /// Direction that is not significant enough to refuse by itself, named after another refusal.
-fn weaker<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    errors: &LoggingErrors<N, B>,
-    here: Quality,
-) -> Option<CauseReport> {
+fn weaker(question: &Question, errors: &LoggingErrors, here: Quality) -> Option<CauseReport> {
     let pairs = errors.found.iter().zip(&errors.directions);
     let likely = pairs.filter(|(found, report)| {
         found.significance() > WEAKER
@@ -345,7 +340,7 @@ fn unknown() -> CauseReport {
     }
 }
 
-fn is_refusing<const N: usize, const B: usize>(errors: &LoggingErrors<N, B>, cause: &CauseReport) -> bool {
+fn is_refusing(errors: &LoggingErrors, cause: &CauseReport) -> bool {
     // A low-pass, or a delay of all joints, belongs to the delays that refused.
     let is_lag = cause.name == "torque_filter" || (cause.name == "delay" && cause.joint.is_none());
     cause.name == "changed_midway"
@@ -354,28 +349,23 @@ fn is_refusing<const N: usize, const B: usize>(errors: &LoggingErrors<N, B>, cau
         })
 }
 
-fn of_refitted<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    errors: &LoggingErrors<N, B>,
-    other: Refitted<B>,
-    here: Quality,
-) -> Tried {
-    let sigma = errors.sigma.map(|sigma| sigma.noise.max(sigma.segments));
+fn of_refitted(question: &Question, errors: &LoggingErrors, other: Refitted, here: Quality) -> Tried {
+    let sigma: Vec<f64> = errors.sigma.iter().map(|sigma| sigma.noise.max(sigma.segments)).collect();
     let sound = is_sound(question, &other.values, &sigma)
         && agrees(question, &errors.equations, &other.columns, &other.torque);
     let remaining = here.remaining * other.remaining.sqrt();
     Tried { cause: other.cause, quality: Quality { remaining, sound }, is_shared: false }
 }
 
-fn of_direction<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    errors: &LoggingErrors<N, B>,
-    found: &Found<B>,
+fn of_direction(
+    question: &Question,
+    errors: &LoggingErrors,
+    found: &Found,
     report: &DirectionReport,
     here: Quality,
 ) -> Tried {
     let remaining = here.remaining * (1.0 - found.explained()).max(0.0).sqrt();
-    let sigma = errors.sigma.map(|sigma| sigma.noise.max(sigma.segments));
+    let sigma: Vec<f64> = errors.sigma.iter().map(|sigma| sigma.noise.max(sigma.segments)).collect();
     let directions = Directions { equations: &errors.equations, zero: question.zero(), axis: question.axis };
     let (columns, torque) = directions.system(found.kind, found.value);
     let sound =
@@ -407,13 +397,11 @@ fn changed_midway(midway: &Midway, here: Quality) -> Tried {
 }
 
 /// Equations with all angles in one other unit, for each unit that is possible.
-pub(crate) fn with_other_angles<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-) -> Vec<(ReadAs, Equations<N, B>)> {
+pub(crate) fn with_other_angles(question: &Question) -> Vec<(ReadAs, Equations)> {
     let of_all = angle_units(question).into_iter().filter(|correction| correction.joint.is_none());
     of_all
         .filter_map(|correction| {
-            let motions: Vec<Motion<N>> =
+            let motions: Vec<Motion> =
                 question.motions.iter().map(|motion| corrected(question, motion, &correction)).collect();
             Some((*correction.reads.first()?, question.equations(&motions).ok().flatten()?))
         })
@@ -421,16 +409,12 @@ pub(crate) fn with_other_angles<const N: usize, const B: usize>(
 }
 
 /// Fit of the corrected motions; `None` with too few rows. `uncorrected` is the power of the torques before.
-fn refit<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    correction: &Correction<N>,
-    uncorrected: &[f64; N],
-) -> Option<Tried> {
-    let motions: Vec<Motion<N>> =
+fn refit(question: &Question, correction: &Correction, uncorrected: &[f64]) -> Option<Tried> {
+    let motions: Vec<Motion> =
         question.motions.iter().map(|motion| corrected(question, motion, correction)).collect();
     let equations = question.equations(&motions).ok().flatten()?;
     // A sum of torques is larger than each; in N m it must leave less.
-    let power = if correction.name == COUPLED_DRIVE { *uncorrected } else { power(&equations) };
+    let power = if correction.name == COUPLED_DRIVE { uncorrected.to_vec() } else { power(&equations) };
     let quality = quality(question, &equations, &power);
     let words = format!(
         "{}; then the misfit is {:.1} % of the torque{}",
@@ -453,41 +437,36 @@ fn refit<const N: usize, const B: usize>(
 }
 
 /// Whether the angle of a joint, or of each, spans more than this, rad.
-fn spans<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    joint: Option<usize>,
-    least: f64,
-) -> bool {
-    (0..N).filter(|at| joint.is_none_or(|joint| joint == *at)).all(|at| {
-        let angles = || question.motions.iter().flat_map(|motion| &motion.position).map(|angles| angles[at]);
+fn spans(question: &Question, joint: Option<usize>, least: f64) -> bool {
+    (0..question.joints()).filter(|at| joint.is_none_or(|joint| joint == *at)).all(|at| {
+        let angles = || question.motions.iter().flat_map(|motion| motion.position.column(at));
         angles().fold(f64::MIN, f64::max) - angles().fold(f64::MAX, f64::min) > least
     })
 }
 
-fn corrected<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    motion: &Motion<N>,
-    correction: &Correction<N>,
-) -> Motion<N> {
+fn corrected(question: &Question, motion: &Motion, correction: &Correction) -> Motion {
     let anatomy = &question.anatomy;
     let mut motion = motion.clone();
-    for (position, torque) in motion.position.iter_mut().zip(&mut motion.torque) {
-        let mut angles = core::array::from_fn(|joint| anatomy[joint].angle_from_chain(position[joint]));
-        let mut torques = core::array::from_fn(|joint| anatomy[joint].from_chain(torque[joint]));
-        (correction.apply)(&mut angles, &mut torques);
-        *position = core::array::from_fn(|joint| anatomy[joint].angle_to_chain(angles[joint]));
-        *torque = core::array::from_fn(|joint| anatomy[joint].to_chain(torques[joint]));
+    let each = |values: &mut [f64], of: fn(&AnatomicalJoint<f64>, f64) -> f64| {
+        values.iter_mut().zip(anatomy).for_each(|(value, joint)| *value = of(joint, *value));
+    };
+    for (angles, torques) in motion.position.rows_mut().zip(motion.torque.rows_mut()) {
+        each(angles, |joint, angle| joint.angle_from_chain(angle));
+        each(torques, |joint, torque| joint.from_chain(torque));
+        (correction.apply)(angles, torques);
+        each(angles, |joint, angle| joint.angle_to_chain(angle));
+        each(torques, |joint, torque| joint.to_chain(torque));
     }
     motion
 }
 
 /// All joints, then each where there are several.
-fn subjects<const N: usize>() -> impl Iterator<Item = Option<usize>> {
-    std::iter::once(None).chain((0..N).filter(|_| N > 1).map(Some))
+fn subjects(joints: usize) -> impl Iterator<Item = Option<usize>> {
+    std::iter::once(None).chain((0..joints).filter(move |_| joints > 1).map(Some))
 }
 
 /// Torque in mN m.
-fn millinewton_metres<const N: usize>() -> Correction<N> {
+fn millinewton_metres() -> Correction {
     Correction {
         name: "torque_unit",
         joint: None,
@@ -499,33 +478,33 @@ fn millinewton_metres<const N: usize>() -> Correction<N> {
 
 /// Corrections of the angles' unit: degrees that span more than a turn in rad, turns of the joint that span
 /// less, and angles of the motor where its gear ratio is stated.
-fn angle_units<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
+fn angle_units(question: &Question) -> Vec<Correction> {
     use std::f64::consts::TAU;
     let mut all = Vec::new();
-    let mut add = |joint: Option<usize>, reads: ReadAs, unit: &str, factors: [f64; N]| {
-        let factors = core::array::from_fn::<f64, N, _>(|at| {
-            if joint.is_none_or(|joint| joint == at) { factors[at] } else { 1.0 }
-        });
+    let joints = question.joints();
+    let mut add = |joint: Option<usize>, reads: ReadAs, unit: &str, mut factors: Vec<f64>| {
+        let others = factors.iter_mut().enumerate().filter(|(at, _)| joint.is_some_and(|joint| joint != *at));
+        others.for_each(|(_, factor)| *factor = 1.0);
         all.push(Correction {
             name: "angle_unit",
             joint,
             words: format!("angle of {} read as {unit}", joint_words(joint)),
             reads: vec![reads],
             apply: Box::new(move |angles, _| {
-                angles.iter_mut().zip(factors).for_each(|(angle, factor)| *angle *= factor);
+                angles.iter_mut().zip(&factors).for_each(|(angle, factor)| *angle *= factor);
             }),
         });
     };
     let degree = TAU / 360.0;
-    for joint in subjects::<N>().filter(|joint| spans(question, *joint, TAU)) {
-        add(joint, ReadAs::Degrees, "degrees", [degree; N]);
+    for joint in subjects(joints).filter(|joint| spans(question, *joint, TAU)) {
+        add(joint, ReadAs::Degrees, "degrees", vec![degree; joints]);
     }
     if !spans(question, None, TAU) {
-        add(None, ReadAs::Turns, "turns", [TAU; N]);
+        add(None, ReadAs::Turns, "turns", vec![TAU; joints]);
     }
     let ratios: Option<Vec<f64>> = question.motor_ratio.iter().copied().collect();
     if let Some(ratios) = ratios {
-        let of_motor = |unit: f64| core::array::from_fn(|joint| unit / ratios[joint]);
+        let of_motor = |unit: f64| ratios.iter().map(|ratio| unit / ratio).collect();
         add(None, ReadAs::MotorRadians, "angle of the motor in rad", of_motor(1.0));
         add(None, ReadAs::MotorDegrees, "angle of the motor in degrees", of_motor(degree));
         add(None, ReadAs::MotorTurns, "turns of the motor", of_motor(TAU));
@@ -534,28 +513,29 @@ fn angle_units<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
 }
 
 /// Corrections of angle and torque at once.
-fn unit_pairs<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
-    let pair = |angle: Correction<N>| {
-        let torque = millinewton_metres::<N>();
+fn unit_pairs(question: &Question) -> Vec<Correction> {
+    let pair = |angle: Correction| {
+        let torque = millinewton_metres();
         Correction {
             name: "units",
             joint: angle.joint,
             words: format!("{}, and {}", angle.words, torque.words),
             reads: [angle.reads, torque.reads].concat(),
-            apply: Box::new(move |angles: &mut [f64; N], torques: &mut [f64; N]| {
+            apply: Box::new(move |angles: &mut [f64], torques: &mut [f64]| {
                 (angle.apply)(angles, torques);
                 (torque.apply)(angles, torques);
-            }) as Change<N>,
+            }) as Change,
         }
     };
     angle_units(question).into_iter().map(pair).collect()
 }
 
 /// All single corrections of units, signs and columns; the simpler first.
-fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec<Correction<N>> {
+fn corrections(question: &Question) -> Vec<Correction> {
     let chosen = |joint: Option<usize>, at: usize| joint.is_none_or(|joint| joint == at);
+    let joints = question.joints();
     let mut all = vec![millinewton_metres()];
-    for joint in subjects::<N>() {
+    for joint in subjects(joints) {
         all.push(Correction {
             name: "torque_sign",
             joint,
@@ -568,8 +548,8 @@ fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
         });
     }
     all.extend(angle_units(question));
-    for one in 0..N {
-        for other in one + 1..N {
+    for one in 0..joints {
+        for other in one + 1..joints {
             for (what, of_angles, of_torques) in [
                 ("torques of joints", false, true),
                 ("angles of joints", true, false),
@@ -592,7 +572,7 @@ fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
             }
         }
     }
-    for joint in 1..N {
+    for joint in 1..joints {
         for (sign, word) in [(1.0, "plus"), (-1.0, "minus")] {
             all.push(Correction {
                 name: COUPLED_DRIVE,
@@ -607,7 +587,7 @@ fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
             });
         }
     }
-    for joint in (0..N).filter(|_| N > 1) {
+    for joint in (0..joints).filter(|_| joints > 1) {
         all.push(Correction {
             name: "angle_sign",
             joint: Some(joint),
@@ -630,60 +610,54 @@ fn corrections<const N: usize, const B: usize>(question: &Question<N, B>) -> Vec
 }
 
 /// Mean square torque of each joint.
-fn power<const N: usize, const B: usize>(equations: &Equations<N, B>) -> [f64; N] {
-    core::array::from_fn(|joint| {
+fn power(equations: &Equations) -> Vec<f64> {
+    let of_joint = |joint: usize| {
         let torques = equations.sources.iter().zip(&equations.torque);
         let of: Vec<f64> =
             torques.filter(|(source, _)| source.joint == joint).map(|(_, torque)| torque * torque).collect();
         of.iter().sum::<f64>() / of.len().max(1) as f64
-    })
+    };
+    (0..equations.joints()).map(of_joint).collect()
 }
 
-fn quality<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    equations: &Equations<N, B>,
-    power: &[f64; N],
-) -> Quality {
+fn quality(question: &Question, equations: &Equations, power: &[f64]) -> Quality {
     let fit = equations.fit(&equations.columns, &equations.torque, false);
     let Equations { columns, torque, weight, .. } = equations;
     let scatter = segment_sigma(&fit, columns, torque, weight, &equations.clusters());
-    let sigma = core::array::from_fn(|base| fit.inverse[base][base].max(0.0).sqrt().max(scatter[base]));
-    let shares = (0..N)
+    let sigma: Vec<f64> = scatter
+        .iter()
+        .enumerate()
+        .map(|(base, scatter)| fit.inverse[base][base].max(0.0).sqrt().max(*scatter))
+        .collect();
+    let joints = equations.joints();
+    let shares = (0..joints)
         .map(|joint| equations.row_sigma[joint].powi(2) * equations.information() / power[joint].max(1e-300));
     Quality {
-        remaining: (shares.sum::<f64>() / N as f64).sqrt(),
+        remaining: (shares.sum::<f64>() / joints as f64).sqrt(),
         sound: is_sound(question, &fit.values, &sigma)
             && agrees(question, equations, &equations.columns, &equations.torque),
     }
 }
 
 /// Whether every parameter that must be positive is so within 5 sigma.
-fn is_sound<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    values: &[f64; B],
-    sigma: &[f64; B],
-) -> bool {
-    (0..question.model.base.rank()).filter(|&base| question.active[base]).all(|base| {
-        let bounded = question.model.base.independent(base).is_some_and(|(_, kind)| kind.is_never_negative());
+fn is_sound(question: &Question, values: &[f64], sigma: &[f64]) -> bool {
+    (0..values.len()).filter(|&base| question.active[base]).all(|base| {
+        let bounded = question.regressor.carrier(base).is_some_and(|(_, kind)| kind.is_never_negative());
         !bounded || values[base] > -NEGATIVE_SIGMA * sigma[base]
     })
 }
 
 /// Whether the torque has the sign and size of the prior's; without a prior, at most thrice the joint's
 /// limit.
-fn agrees<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    equations: &Equations<N, B>,
-    columns: &[[f64; B]],
-    torque: &[f64],
-) -> bool {
-    let rows = || equations.sources.iter().zip(torque).zip(columns);
-    let Some(prior) = question.prior else {
+fn agrees(question: &Question, equations: &Equations, columns: &Table, torque: &[f64]) -> bool {
+    let rows = || equations.sources.iter().zip(torque).zip(columns.rows());
+    let Some(prior) = &question.prior else {
         return rows().all(|((source, torque), _)| torque.abs() < 3.0 * question.torque_limit[source.joint]);
     };
-    let (mut along, mut measured, mut expected) = (0.0, [0.0; N], [0.0; N]);
+    let zeros = || vec![0.0; equations.joints()];
+    let (mut along, mut measured, mut expected) = (0.0, zeros(), zeros());
     for ((source, torque), row) in rows() {
-        let guess: f64 = row.iter().zip(&prior).map(|(element, value)| element * value).sum();
+        let guess = dot(row, prior);
         along += guess * torque;
         measured[source.joint] += torque * torque;
         expected[source.joint] += guess * guess;

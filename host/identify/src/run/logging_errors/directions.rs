@@ -40,12 +40,13 @@ use std::borrow::Cow;
 
 use nalgebra::{Rotation3, Unit, Vector3};
 use rayon::prelude::*;
-use scarab::ident::{RowModel, Smoothed};
 use scarab::model::Parameter;
 use scarab::real::dot;
 
 use crate::run::logging_errors::fit::{Fit, Score};
+use crate::run::logging_errors::regressor::Instant;
 use crate::run::logging_errors::rows::Equations;
+use crate::run::logging_errors::table::Table;
 
 /// Standard deviations that chance exceeds once in ten million tests.
 pub(crate) const CHANCE: f64 = 5.2;
@@ -171,7 +172,7 @@ impl Kind {
 
 /// One direction with the parameters fitted beside it.
 #[derive(Clone, Debug)]
-pub(crate) struct Found<const B: usize> {
+pub(crate) struct Found {
     /// Kind of error.
     pub(crate) kind: Kind,
     /// Value, SI.
@@ -187,9 +188,9 @@ pub(crate) struct Found<const B: usize> {
     /// Cost without and with the direction.
     pub(crate) cost: (f64, f64),
     /// Parameters of the training motion, with the direction minus without it.
-    pub(crate) shift: [f64; B],
+    pub(crate) shift: Vec<f64>,
     /// All parameters with the direction.
-    pub(crate) values: [f64; B],
+    pub(crate) values: Vec<f64>,
     /// Directions that cannot be distinguished from this one.
     pub(crate) alike: Vec<String>,
     column: Vec<f64>,
@@ -198,7 +199,7 @@ pub(crate) struct Found<const B: usize> {
     pub(crate) torque_share: f64,
 }
 
-impl<const B: usize> Found<B> {
+impl Found {
     /// The larger standard deviation.
     pub(crate) fn sigma(&self) -> f64 {
         self.noise_sigma.max(self.segment_sigma)
@@ -221,9 +222,9 @@ impl<const B: usize> Found<B> {
 
     /// Variance that a possible error adds to each parameter: the shift, reduced by the part that chance
     /// explains.
-    pub(crate) fn variance(&self) -> [f64; B] {
+    pub(crate) fn variance(&self) -> impl Iterator<Item = f64> + '_ {
         let certain = (1.0 - (2.0 / self.significance().max(1e-9)).powi(2)).max(0.0);
-        self.shift.map(|shift| shift * shift * certain)
+        self.shift.iter().map(move |shift| shift * shift * certain)
     }
 }
 
@@ -234,40 +235,42 @@ fn gain(plain: f64, without: f64, with: f64) -> f64 {
 }
 
 /// Joint's zero in chain angles, and its torques.
-pub(crate) struct Directions<'a, const N: usize, const B: usize> {
+pub(crate) struct Directions<'a> {
     /// Filtered rows.
-    pub(crate) equations: &'a Equations<N, B>,
+    pub(crate) equations: &'a Equations,
     /// Chain angle of each joint's zero, rad.
-    pub(crate) zero: [f64; N],
+    pub(crate) zero: Vec<f64>,
     /// Axis of the first joint in the base frame.
     pub(crate) axis: Vector3<f64>,
 }
 
 /// A solution beside the parameters.
-struct Solved<'a, const B: usize> {
+struct Solved<'a> {
     value: f64,
     at_limit: bool,
-    system: System<'a, B>,
-    fit: Fit<B>,
+    system: System<'a>,
+    fit: Fit,
     score: Score,
 }
 
-impl<const B: usize> Solved<'_, B> {
+impl Solved<'_> {
     /// Whether a further step would be lost in the noise, or the motion does not show the direction.
     fn is_settled(&self) -> bool {
         self.score.seen < SEEN_SHARE || self.score.delta.abs() < 0.05 * self.score.noise_sigma
     }
 }
 
-type System<'a, const B: usize> = (Cow<'a, [[f64; B]]>, Cow<'a, [f64]>);
+type System<'a> = (Cow<'a, Table>, Cow<'a, [f64]>);
 
-impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
+impl<'a> Directions<'a> {
     /// Fits every direction and lists those that cannot be distinguished from it.
-    pub(crate) fn all(&self) -> Vec<Found<B>> {
+    pub(crate) fn all(&self) -> Vec<Found> {
         let plain = self.equations.fit(&self.equations.columns, &self.equations.torque, false);
         let training = self.equations.fit(&self.equations.columns, &self.equations.torque, true);
-        let mut found: Vec<Found<B>> =
-            Kind::all(N).into_par_iter().map(|kind| self.one(kind, &plain, &training)).collect();
+        let mut found: Vec<Found> = Kind::all(self.equations.joints())
+            .into_par_iter()
+            .map(|kind| self.one(kind, &plain, &training))
+            .collect();
         for one in 0..found.len() {
             let names: Vec<String> = (0..found.len())
                 .filter(|&other| other != one && found[one].seen && found[other].seen)
@@ -286,24 +289,23 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     }
 
     /// Columns and torques with a direction at `value`.
-    pub(crate) fn system(&self, kind: Kind, value: f64) -> System<'a, B> {
+    pub(crate) fn system(&self, kind: Kind, value: f64) -> System<'a> {
         let all = self.equations;
         let plain = Cow::Borrowed(all.torque.as_slice());
         match kind {
             Kind::Delay(joint) => (Cow::Borrowed(&all.columns), Cow::Owned(all.delayed(Some(joint), value))),
             Kind::EncoderScale(joint) => (Cow::Owned(self.scaled(joint, 1.0 / (1.0 + value))), plain),
             Kind::TorqueScale(joint) => {
-                let pairs = all.columns.iter().zip(&all.sources);
-                let columns = pairs.map(|(row, source)| {
-                    if source.joint == joint { row.map(|element| (1.0 + value) * element) } else { *row }
-                });
-                (Cow::Owned(columns.collect()), plain)
+                let mut columns = all.columns.clone();
+                for (row, _) in columns.rows_mut().zip(&all.sources).filter(|(_, of)| of.joint == joint) {
+                    row.iter_mut().for_each(|element| *element *= 1.0 + value);
+                }
+                (Cow::Owned(columns), plain)
             }
             Kind::Gravity => {
-                let model = all.model();
                 let turn = Rotation3::from_axis_angle(&Unit::new_normalize(self.axis), -value);
-                let turned = RowModel { gravity: turn * model.gravity, ..model.clone() };
-                (Cow::Owned(all.columns_of(&turned, &|_| {})), plain)
+                let turned = all.regressor.with_gravity(&|gravity| turn * gravity);
+                (Cow::Owned(all.columns_of(&*turned, &|_| {})), plain)
             }
             Kind::Spring(_) | Kind::Drift(Drifting::Offset, _) => {
                 let beside = self.beside(kind, &[]);
@@ -312,28 +314,29 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
             }
             Kind::Drift(what, joint) => {
                 let drifts = self.drifting(what, joint);
-                let pairs = all.columns.iter().zip(&all.sources);
-                let columns = pairs.map(|(row, source)| {
-                    let factor = if source.joint == joint { 1.0 + value * source.drift() } else { 1.0 };
-                    core::array::from_fn(|base| if drifts[base] { factor * row[base] } else { row[base] })
-                });
-                (Cow::Owned(columns.collect()), plain)
+                let mut columns = all.columns.clone();
+                for (row, of) in columns.rows_mut().zip(&all.sources).filter(|(_, of)| of.joint == joint) {
+                    let elements = row.iter_mut().zip(&drifts).filter(|(_, drifts)| **drifts);
+                    elements.for_each(|(element, _)| *element *= 1.0 + value * of.drift());
+                }
+                (Cow::Owned(columns), plain)
             }
         }
     }
 
     /// Base parameters whose torque drifts.
-    fn drifting(&self, what: Drifting, joint: usize) -> [bool; B] {
-        core::array::from_fn(|base| match what {
+    fn drifting(&self, what: Drifting, joint: usize) -> Vec<bool> {
+        let regressor = &self.equations.regressor;
+        let is_friction = |base: usize| {
+            let carrier = regressor.carrier(base);
+            carrier.is_some_and(|(of, kind)| of == joint && matches!(kind, Parameter::FC | Parameter::FV))
+        };
+        let drifts = |base: usize| match what {
             Drifting::Offset => false,
             Drifting::Torque => true,
-            Drifting::Friction => self
-                .equations
-                .model()
-                .base
-                .independent(base)
-                .is_some_and(|(of, kind)| of == joint && matches!(kind, Parameter::FC | Parameter::FV)),
-        })
+            Drifting::Friction => is_friction(base),
+        };
+        (0..regressor.rank()).map(drifts).collect()
     }
 
     /// Torque that a spring or a drift of value one adds to each equation, by these parameters.
@@ -343,11 +346,11 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
             Kind::Spring(joint) => all.angles(joint),
             Kind::Drift(what, joint) => {
                 let drifts = self.drifting(what, joint);
-                let of = |row: &[f64; B]| -> f64 {
-                    let each = row.iter().zip(parameters).zip(drifts).filter(|(_, drifts)| *drifts);
+                let of = |row: &[f64]| -> f64 {
+                    let each = row.iter().zip(parameters).zip(&drifts).filter(|(_, drifts)| **drifts);
                     each.map(|((element, value), _)| element * value).sum()
                 };
-                let rows = all.columns.iter().zip(&all.sources);
+                let rows = all.columns.rows().zip(&all.sources);
                 rows.map(|(row, source)| match what {
                     _ if source.joint != joint => 0.0,
                     Drifting::Offset => source.drift(),
@@ -360,18 +363,18 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
     }
 
     /// Columns with the angle of a joint multiplied about its zero.
-    pub(crate) fn scaled(&self, joint: usize, factor: f64) -> Vec<[f64; B]> {
+    pub(crate) fn scaled(&self, joint: usize, factor: f64) -> Table {
         let zero = self.zero[joint];
-        let change = |instant: &mut Smoothed<f64, N>| {
+        let change = |instant: &mut Instant| {
             instant.position[joint] = zero + factor * (instant.position[joint] - zero);
             instant.velocity[joint] *= factor;
             instant.acceleration[joint] *= factor;
         };
-        self.equations.columns_of(self.equations.model(), &change)
+        self.equations.columns_of(&*self.equations.regressor, &change)
     }
 
     /// Change of the prediction with the direction.
-    fn column(&self, kind: Kind, value: f64, columns: &[[f64; B]], fit: &Fit<B>) -> Vec<f64> {
+    fn column(&self, kind: Kind, value: f64, columns: &Table, fit: &Fit) -> Vec<f64> {
         let all = self.equations;
         let predicted = fit.predictions(columns);
         match kind {
@@ -396,14 +399,14 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
         }
     }
 
-    fn score(&self, kind: Kind, value: f64, system: &System<'_, B>, fit: &Fit<B>) -> Score {
+    fn score(&self, kind: Kind, value: f64, system: &System<'_>, fit: &Fit) -> Score {
         let z = self.column(kind, value, &system.0, fit);
         self.equations.score(fit, &system.0, &system.1, &z)
     }
 
     /// Best point of the scan, if it costs less than zero does.
-    fn scanned(&self, kind: Kind, plain: &Fit<B>) -> Option<f64> {
-        let cost = |system: System<'_, B>| self.equations.fit(&system.0, &system.1, false).cost;
+    fn scanned(&self, kind: Kind, plain: &Fit) -> Option<f64> {
+        let cost = |system: System<'_>| self.equations.fit(&system.0, &system.1, false).cost;
         let scanned: Vec<(f64, f64)> = match kind {
             Kind::Delay(_) => {
                 let largest = self.equations.largest_delay_s();
@@ -432,25 +435,24 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
 
     /// Columns with gravity turned by any angle, from those of three angles: the regressor is linear in
     /// gravity.
-    fn turned_gravity(&self) -> impl Fn(f64) -> Vec<[f64; B]> {
+    fn turned_gravity(&self) -> impl Fn(f64) -> Table {
         let quarter = 0.5 * std::f64::consts::PI;
         let [ahead, across, back] =
             [0.0, quarter, 2.0 * quarter].map(|angle| self.system(Kind::Gravity, angle).0.into_owned());
         move |angle| {
             let (sine, cosine) = angle.sin_cos();
-            let rows = ahead.iter().zip(&across).zip(&back);
-            rows.map(|((ahead, across), back)| {
-                core::array::from_fn(|base| {
-                    let without = 0.5 * (ahead[base] + back[base]);
-                    without + cosine * 0.5 * (ahead[base] - back[base]) + sine * (across[base] - without)
-                })
-            })
-            .collect()
+            let mut turned = ahead.clone();
+            let rows = turned.elements_mut().zip(across.elements().zip(back.elements()));
+            for (element, (across, back)) in rows {
+                let without = 0.5 * (*element + back);
+                *element = without + cosine * 0.5 * (*element - back) + sine * (across - without);
+            }
+            turned
         }
     }
 
     /// Gauss-Newton from a start. A step that costs more is halved.
-    fn solved(&self, kind: Kind, start: f64) -> Solved<'a, B> {
+    fn solved(&self, kind: Kind, start: f64) -> Solved<'a> {
         let (largest, step) = kind.range();
         let largest = match kind {
             Kind::Delay(_) => self.equations.largest_delay_s(),
@@ -481,17 +483,17 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
         here
     }
 
-    fn at(&self, kind: Kind, value: f64) -> Solved<'a, B> {
+    fn at(&self, kind: Kind, value: f64) -> Solved<'a> {
         let system = self.system(kind, value);
         let fit = self.equations.fit(&system.0, &system.1, false);
         let score = self.score(kind, value, &system, &fit);
         Solved { value, at_limit: false, system, fit, score }
     }
 
-    fn one(&self, kind: Kind, plain: &Fit<B>, training: &Fit<B>) -> Found<B> {
+    fn one(&self, kind: Kind, plain: &Fit, training: &Fit) -> Found {
         let near = self.solved(kind, 0.0);
         let far = self.scanned(kind, plain).map(|start| self.solved(kind, start));
-        let earned = |far: &Solved<'_, B>| {
+        let earned = |far: &Solved<'_>| {
             gain(plain.cost, near.fit.cost, far.fit.cost) > CHANCE
                 && far.fit.cost < (1.0 - EXPLAINED_SHARE) * near.fit.cost
         };
@@ -514,18 +516,21 @@ impl<'a, const N: usize, const B: usize> Directions<'a, N, B> {
             seen,
             at_limit,
             cost: (plain.cost, fit.cost),
-            shift: core::array::from_fn(
-                |base| if seen { with.values[base] - training.values[base] } else { 0.0 },
-            ),
+            shift: with
+                .values
+                .iter()
+                .zip(&training.values)
+                .map(|(with, without)| if seen { with - without } else { 0.0 })
+                .collect(),
+            torque_share: value.abs() * self.torque_share(kind, &fit.values, &score),
             values: fit.values,
             alike: Vec::new(),
-            torque_share: value.abs() * self.torque_share(kind, &fit.values, &score),
             column: score.column,
         }
     }
 
     /// Torque of a spring or a drift of value one over that of its joint, root mean squares.
-    fn torque_share(&self, kind: Kind, parameters: &[f64; B], score: &Score) -> f64 {
+    fn torque_share(&self, kind: Kind, parameters: &[f64], score: &Score) -> f64 {
         let all = self.equations;
         let (beside, joint): (Vec<f64>, usize) = match kind {
             Kind::Spring(joint) => {

@@ -20,7 +20,7 @@
 
 use std::path::PathBuf;
 
-use scarab::ident::{KernelError, RowModel, SAMPLE_RATE_HZ, Smoothed};
+use scarab::ident::{KernelError, RowModel, SAMPLE_RATE_HZ};
 use scarab::model::Parameter;
 use scarab::real::Real;
 use scarab_base::stats::rms;
@@ -29,7 +29,9 @@ use crate::formats::leg_file::LegFile;
 use crate::formats::recording::{JointSeries, Recording};
 use crate::leg::setup::encoder_steps;
 use crate::run::logging_errors::fit::{Fit, solve};
+use crate::run::logging_errors::regressor::Instant;
 use crate::run::logging_errors::rows::{Equations, Filters, Motion};
+use crate::run::logging_errors::table::Table;
 use crate::run::resample::Resampled;
 
 /// Share of the changes of a column that must be whole steps.
@@ -96,26 +98,26 @@ impl Encoder {
 }
 
 /// Encoders of the recordings' angles.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Encoders<const N: usize> {
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Encoders {
     /// Encoder of each joint; `None` where the angle is continuous.
-    pub(crate) joints: [Option<Encoder>; N],
+    pub(crate) joints: Vec<Option<Encoder>>,
     /// Time between two samples, s.
     pub(crate) sample_s: f64,
 }
 
 /// Effect of the steps on the parameters.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Bias<const N: usize, const B: usize> {
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Bias {
     /// Bias of each base parameter, as a standard deviation.
-    pub(crate) sigma: [f64; B],
+    pub(crate) sigma: Vec<f64>,
     /// Error of each joint's predicted torque, share of its rms.
-    pub(crate) torque_share: [f64; N],
+    pub(crate) torque_share: Vec<f64>,
     /// Power of the steps' noise over that of a joint's noisiest inertial column.
-    pub(crate) column_noise: [f64; N],
+    pub(crate) column_noise: Vec<f64>,
 }
 
-impl<const N: usize, const B: usize> Bias<N, B> {
+impl Bias {
     /// Joint with the largest torque error, and that error as a share.
     pub(crate) fn largest_share(&self) -> (usize, f64) {
         largest(&self.torque_share)
@@ -137,24 +139,21 @@ impl<const N: usize, const B: usize> Bias<N, B> {
     }
 }
 
-impl<const N: usize> Encoders<N> {
+impl Encoders {
     /// Describes the encoders to a model, for rows of this bandwidth: standstill by the leg file, pulses by
     /// the coarser of leg file and recordings. The counts of a recording alone do not determine standstill:
     /// with 2.9 mrad, slow rows of the real pendulum `sp` still predict well.
-    pub(crate) fn describe<T: Real, const B: usize>(
+    pub(crate) fn describe<T: Real, const N: usize, const B: usize>(
         &self,
         leg: &LegFile,
         bandwidth_hz: f64,
         model: &mut RowModel<T, N, B>,
     ) {
         let described = encoder_steps::<T, N>(leg);
-        let seen = self.joints.map(|joint| T::from_double(joint.map_or(0.0, |encoder| encoder.step_rad)));
-        let coarser =
-            core::array::from_fn(
-                |joint| {
-                    if seen[joint] > described[joint] { seen[joint] } else { described[joint] }
-                },
-            );
+        let coarser = core::array::from_fn(|joint| {
+            let seen = T::from_double(self.joints[joint].map_or(0.0, |encoder| encoder.step_rad));
+            if seen > described[joint] { seen } else { described[joint] }
+        });
         model.set_encoders(&coarser, T::from_double(bandwidth_hz));
         let pulse = model.pulse;
         model.set_encoders(&described, T::from_double(bandwidth_hz));
@@ -165,23 +164,24 @@ impl<const N: usize> Encoders<N> {
     ///
     /// # Errors
     /// The filter cannot be built for the bandwidth.
-    pub(crate) fn bias<const B: usize>(
+    pub(crate) fn bias(
         &self,
-        equations: &Equations<N, B>,
-        fit: &Fit<B>,
+        equations: &Equations,
+        fit: &Fit,
         bandwidth_hz: f64,
-    ) -> Result<Option<Bias<N, B>>, KernelError> {
+    ) -> Result<Option<Bias>, KernelError> {
         if !self.can_matter(equations, bandwidth_hz) {
             return Ok(None);
         }
-        let refit = |phase: Option<f64>| -> Result<Option<(Equations<N, B>, [f64; B])>, KernelError> {
-            let motions: Vec<Motion<N>> = equations
+        let refit = |phase: Option<f64>| -> Result<Option<(Equations, Vec<f64>)>, KernelError> {
+            let motions: Vec<Motion> = equations
                 .smoothed()
                 .filter(|(instants, _)| instants.len() > 1)
                 .map(|(instants, training_s)| self.repeated(equations, fit, instants, training_s, phase))
                 .collect();
             let filters = Filters::new(bandwidth_hz)?;
-            let Some(again) = Equations::new(equations.model(), &motions, filters, &equations.active) else {
+            let Some(again) = Equations::new(&equations.regressor, &motions, filters, &equations.active)
+            else {
                 return Ok(None);
             };
             let weight: Vec<f64> = again
@@ -193,30 +193,33 @@ impl<const N: usize> Encoders<N> {
             Ok(Some((again, values)))
         };
         let Some((smooth, before)) = refit(None)? else { return Ok(None) };
-        let (mut shifts, mut noise, mut predicted) = (Vec::new(), [0.0; N], [0.0; N]);
+        let (mut shifts, mut noise, mut predicted) = (Table::new(before.len()), Vec::new(), Vec::new());
         for phase in 0..PHASES {
             let Some((read, values)) = refit(Some(phase as f64 / PHASES as f64))? else { return Ok(None) };
-            shifts.push(core::array::from_fn::<f64, B, _>(|base| values[base] - before[base]));
+            let shift: Vec<f64> = values.iter().zip(&before).map(|(read, smooth)| read - smooth).collect();
+            shifts.push(&shift);
             if phase == 0 {
-                let before_steps = smooth.columns_at(&read.sources, smooth.model(), &|_| {});
+                let before_steps = smooth.columns_at(&read.sources, &*smooth.regressor, &|_| {});
                 noise = column_noise(&before_steps, &read);
                 predicted = prediction_noise(&before_steps, &read, fit);
             }
         }
         let count = shifts.len() as f64;
-        let mean: [f64; B] =
-            core::array::from_fn(|base| shifts.iter().map(|shift| shift[base]).sum::<f64>() / count);
-        let sigma = core::array::from_fn(|base| rms(shifts.iter().map(|shift| shift[base])));
-        let torque_share = core::array::from_fn(|joint| {
+        let mean: Vec<f64> = (0..before.len()).map(|base| shifts.column(base).sum::<f64>() / count).collect();
+        let sigma = (0..before.len()).map(|base| rms(shifts.column(base))).collect();
+        let missing = equations.columns.times(&mean);
+        let torque_share = |joint: usize| {
             let (mut missed, mut all) = (0.0, 0.0);
-            let rows = equations.sources.iter().zip(&equations.columns).zip(&equations.torque);
-            for ((_, row), torque) in rows.filter(|((source, _), _)| source.joint == joint && source.training)
+            let rows = equations.sources.iter().zip(&missing).zip(&equations.torque);
+            for ((_, missing), torque) in
+                rows.filter(|((source, _), _)| source.joint == joint && source.training)
             {
-                missed += row.iter().zip(&mean).map(|(element, bias)| element * bias).sum::<f64>().powi(2);
+                missed += missing * missing;
                 all += torque * torque;
             }
-            (missed / all.max(1e-300)).sqrt().hypot(predicted[joint])
-        });
+            f64::sqrt(missed / f64::max(all, 1e-300)).hypot(predicted[joint])
+        };
+        let torque_share = (0..equations.joints()).map(torque_share).collect();
         Ok(Some(Bias { sigma, torque_share, column_noise: noise }))
     }
 
@@ -225,10 +228,10 @@ impl<const N: usize> Encoders<N> {
     ///
     /// # Errors
     /// The filter cannot be built for a bandwidth.
-    pub(crate) fn bandwidth_hz<const B: usize>(
+    pub(crate) fn bandwidth_hz(
         &self,
         largest_hz: f64,
-        rows: impl Fn(f64) -> Result<Option<Equations<N, B>>, KernelError>,
+        rows: impl Fn(f64) -> Result<Option<Equations>, KernelError>,
     ) -> Result<f64, KernelError> {
         let [.., mut chosen] = BANDWIDTHS_HZ;
         for &bandwidth_hz in BANDWIDTHS_HZ.iter().rev().filter(|&&bandwidth_hz| bandwidth_hz <= largest_hz) {
@@ -248,11 +251,11 @@ impl<const N: usize> Encoders<N> {
     }
 
     /// Whether the noise of the steps is more than [`NEGLIGIBLE`] in some joint's acceleration.
-    fn can_matter<const B: usize>(&self, equations: &Equations<N, B>, bandwidth_hz: f64) -> bool {
+    fn can_matter(&self, equations: &Equations, bandwidth_hz: f64) -> bool {
         let rate_hz = (1.0 / self.sample_s).max(SAMPLE_RATE_HZ);
         // Second derivative of white noise behind a low-pass: integral of (2 pi f)^4 over its band.
         let gain = 2.0 / rate_hz * (core::f64::consts::TAU).powi(4) * bandwidth_hz.powi(5) / 5.0;
-        (0..N).any(|joint| {
+        (0..equations.joints()).any(|joint| {
             let Some(encoder) = self.joints[joint] else { return false };
             let (mut power, mut count) = (0.0, 0.0);
             for instant in equations.smoothed().flat_map(|(instants, _)| instants) {
@@ -266,26 +269,21 @@ impl<const N: usize> Encoders<N> {
 
     /// Smoothed motion with its predicted torque, read by the encoders at a phase; unquantised without a
     /// phase.
-    fn repeated<const B: usize>(
+    fn repeated(
         &self,
-        equations: &Equations<N, B>,
-        fit: &Fit<B>,
-        instants: &[Smoothed<f64, N>],
+        equations: &Equations,
+        fit: &Fit,
+        instants: &[Instant],
         training_s: f64,
         phase: Option<f64>,
-    ) -> Motion<N> {
-        let model = equations.model();
-        let torque: Vec<[f64; N]> = instants
-            .iter()
-            .map(|instant| {
-                let rows = model.rows(instant);
-                rows.regressor.map(|row| row.iter().zip(&fit.values).map(|(x, p)| x * p).sum())
-            })
-            .collect();
+    ) -> Motion {
+        let joints = equations.joints();
+        let predicted = instants.iter().map(|instant| equations.regressor.rows(instant).times(&fit.values));
+        let torque = Table::of_rows(joints, predicted);
         let end_s = instants.len().saturating_sub(1) as f64 / SAMPLE_RATE_HZ;
         let samples = (end_s / self.sample_s).floor() as usize + 1;
         let time_s: Vec<f64> = (0..samples).map(|sample| sample as f64 * self.sample_s).collect();
-        let joints = (0..N).map(|joint| {
+        let series = (0..joints).map(|joint| {
             let angle = |time_s: f64| angle_at(instants, joint, time_s);
             JointSeries {
                 position_rad: time_s
@@ -299,13 +297,13 @@ impl<const N: usize> Encoders<N> {
             }
         });
         let recording =
-            Recording { file: PathBuf::new(), joints: joints.collect(), time_s, joints_in_file: N };
+            Recording { file: PathBuf::new(), joints: series.collect(), time_s, joints_in_file: joints };
         let grid = Resampled::new(&recording);
         Motion {
             training_s: training_s - grid.start_s,
             within_s: [0.0, grid.len() as f64 / SAMPLE_RATE_HZ],
-            position: (0..grid.len()).filter_map(|point| grid.position_rad::<N>(point)).collect(),
-            torque: (0..grid.len()).filter_map(|point| grid.torque_nm::<N>(point)).collect(),
+            position: Table::of_columns(grid.joints.iter().map(|joint| &joint.position_rad[..])),
+            torque: Table::of_columns(grid.joints.iter().map(|joint| &joint.torque_nm[..])),
         }
     }
 }
@@ -316,10 +314,10 @@ fn largest(of_joints: &[f64]) -> (usize, f64) {
 }
 
 /// Power by which the noisiest inertial column of each joint differs between two motions, over its own.
-fn column_noise<const N: usize, const B: usize>(before: &[[f64; B]], read: &Equations<N, B>) -> [f64; N] {
-    core::array::from_fn(|joint| {
-        let inertial = (0..B).filter(|&base| {
-            let carrier = read.model().base.independent(base);
+fn column_noise(before: &Table, read: &Equations) -> Vec<f64> {
+    let of_joint = |joint: usize| {
+        let inertial = (0..read.active.len()).filter(|&base| {
+            let carrier = read.regressor.carrier(base);
             read.active[base]
                 && carrier.is_some_and(|(own, parameter)| {
                     own == joint && matches!(parameter, Parameter::ZZ | Parameter::IA)
@@ -327,7 +325,7 @@ fn column_noise<const N: usize, const B: usize>(before: &[[f64; B]], read: &Equa
         });
         let share = |base: usize| {
             let (mut noise, mut power) = (0.0, 0.0);
-            for ((source, before), after) in read.sources.iter().zip(before).zip(&read.columns) {
+            for ((source, before), after) in read.sources.iter().zip(before.rows()).zip(read.columns.rows()) {
                 if source.joint == joint && source.training {
                     noise += (after[base] - before[base]).powi(2);
                     power += before[base].powi(2);
@@ -336,25 +334,23 @@ fn column_noise<const N: usize, const B: usize>(before: &[[f64; B]], read: &Equa
             noise / f64::max(power, 1e-300)
         };
         inertial.map(share).fold(0.0, f64::max)
-    })
+    };
+    (0..read.joints()).map(of_joint).collect()
 }
 
 /// Change of each joint's prediction by the steps, share of its rms. `smooth` are the columns without them.
-fn prediction_noise<const N: usize, const B: usize>(
-    smooth: &[[f64; B]],
-    read: &Equations<N, B>,
-    fit: &Fit<B>,
-) -> [f64; N] {
+fn prediction_noise(smooth: &Table, read: &Equations, fit: &Fit) -> Vec<f64> {
     let (smooth, read_torque) = (fit.predictions(smooth), fit.predictions(&read.columns));
-    core::array::from_fn(|joint| {
+    let of_joint = |joint: usize| {
         let (mut noise, mut power) = (0.0, 0.0);
         let rows = read.sources.iter().zip(smooth.iter().zip(&read_torque));
         for (_, (smooth, read)) in rows.filter(|(source, _)| source.joint == joint && source.training) {
             noise += (read - smooth).powi(2);
             power += smooth * smooth;
         }
-        (noise / f64::max(power, 1e-300)).sqrt()
-    })
+        f64::sqrt(noise / f64::max(power, 1e-300))
+    };
+    (0..read.joints()).map(of_joint).collect()
 }
 
 /// Step of an encoder from the changes of its angle in ascending order. The change at `index` must be one
@@ -381,14 +377,14 @@ fn between(time_s: f64, points: usize) -> (usize, f64) {
     (first, position - first as f64)
 }
 
-fn linear<const N: usize>(series: &[[f64; N]], joint: usize, time_s: f64) -> f64 {
+fn linear(series: &Table, joint: usize, time_s: f64) -> f64 {
     let (first, share) = between(time_s, series.len());
-    let after = series.get(first + 1).unwrap_or(&series[first])[joint];
+    let after = series[(first + 1).min(series.len() - 1)][joint];
     series[first][joint] + share * (after - series[first][joint])
 }
 
 /// Angle at any time: cubic with the smoothed speeds.
-fn angle_at<const N: usize>(instants: &[Smoothed<f64, N>], joint: usize, time_s: f64) -> f64 {
+fn angle_at(instants: &[Instant], joint: usize, time_s: f64) -> f64 {
     let (first, share) = between(time_s, instants.len());
     let left = &instants[first];
     let right = instants.get(first + 1).unwrap_or(left);

@@ -12,40 +12,43 @@
 
 use scarab::real::dot;
 
+use crate::run::logging_errors::table::Table;
+
 /// Smallest independent share of a column that counts as determined.
 const DETERMINED_SHARE: f64 = 1e-9;
 
 /// Solution of a weighted least-squares problem.
 #[derive(Clone, Debug)]
-pub(crate) struct Fit<const B: usize> {
+pub(crate) struct Fit {
     /// Values; zero where not determined.
-    pub(crate) values: [f64; B],
+    pub(crate) values: Vec<f64>,
     /// Inverse of A: covariance if the weights are one over sigma.
-    pub(crate) inverse: Box<[[f64; B]; B]>,
+    pub(crate) inverse: Table,
     /// Sum of squared weighted residuals.
     pub(crate) cost: f64,
     /// Number of determined columns.
     pub(crate) rank: usize,
 }
 
-impl<const B: usize> Fit<B> {
+impl Fit {
     /// Torque minus prediction of every equation.
-    pub(crate) fn residuals(&self, columns: &[[f64; B]], torque: &[f64]) -> Vec<f64> {
-        columns.iter().zip(torque).map(|(row, torque)| torque - dot(row, &self.values)).collect()
+    pub(crate) fn residuals(&self, columns: &Table, torque: &[f64]) -> Vec<f64> {
+        columns.rows().zip(torque).map(|(row, torque)| torque - dot(row, &self.values)).collect()
     }
 
     /// Predicted torque of every equation.
-    pub(crate) fn predictions(&self, columns: &[[f64; B]]) -> Vec<f64> {
-        columns.iter().map(|row| dot(row, &self.values)).collect()
+    pub(crate) fn predictions(&self, columns: &Table) -> Vec<f64> {
+        columns.times(&self.values)
     }
 }
 
 /// Inverse of the normal matrix; columns that are not determined are zero.
-fn inverse<const B: usize>(matrix: &[[f64; B]; B], active: &[bool; B]) -> (Box<[[f64; B]; B]>, usize) {
-    let scale: [f64; B] = core::array::from_fn(|column| matrix[column][column].max(0.0).sqrt());
-    let mut lower = [[0.0; B]; B];
-    let mut kept = [false; B];
-    for row in 0..B {
+fn inverse(matrix: &Table, active: &[bool]) -> (Table, usize) {
+    let size = active.len();
+    let scale: Vec<f64> = (0..size).map(|column| matrix[column][column].max(0.0).sqrt()).collect();
+    let mut lower = Table::zeros(size, size);
+    let mut kept = vec![false; size];
+    for row in 0..size {
         if !active[row] || !(scale[row] > 0.0) {
             continue;
         }
@@ -63,16 +66,16 @@ fn inverse<const B: usize>(matrix: &[[f64; B]; B], active: &[bool; B]) -> (Box<[
                 lower[row][row] = sum.sqrt();
                 kept[row] = true;
             } else {
-                lower[row] = [0.0; B];
+                lower[row].fill(0.0);
             }
         }
     }
-    let mut result = Box::new([[0.0; B]; B]);
+    let mut result = Table::zeros(size, size);
     let rank = kept.iter().filter(|kept| **kept).count();
     // Columns of L^-1, then L^-T L^-1.
-    let mut half = [[0.0; B]; B];
-    for unit in (0..B).filter(|&unit| kept[unit]) {
-        for row in (unit..B).filter(|&row| kept[row]) {
+    let mut half = Table::zeros(size, size);
+    for unit in (0..size).filter(|&unit| kept[unit]) {
+        for row in (unit..size).filter(|&row| kept[row]) {
             let mut sum = if row == unit { 1.0 } else { 0.0 };
             for inner in unit..row {
                 sum -= lower[row][inner] * half[inner][unit];
@@ -80,43 +83,34 @@ fn inverse<const B: usize>(matrix: &[[f64; B]; B], active: &[bool; B]) -> (Box<[
             half[row][unit] = sum / lower[row][row];
         }
     }
-    for row in (0..B).filter(|&row| kept[row]) {
-        for column in (0..B).filter(|&column| kept[column]) {
-            let sum: f64 = (row.max(column)..B).map(|inner| half[inner][row] * half[inner][column]).sum();
+    for row in (0..size).filter(|&row| kept[row]) {
+        for column in (0..size).filter(|&column| kept[column]) {
+            let sum: f64 = (row.max(column)..size).map(|inner| half[inner][row] * half[inner][column]).sum();
             result[row][column] = sum / (scale[row] * scale[column]);
         }
     }
     (result, rank)
 }
 
-fn apply<const B: usize>(matrix: &[[f64; B]; B], vector: &[f64; B]) -> [f64; B] {
-    core::array::from_fn(|row| dot(&matrix[row], vector))
-}
-
 /// Solves in closed form.
-pub(crate) fn solve<const B: usize>(
-    columns: &[[f64; B]],
-    torque: &[f64],
-    weight: &[f64],
-    active: &[bool; B],
-) -> Fit<B> {
-    let mut normal = Box::new([[0.0; B]; B]);
-    let mut right = [0.0; B];
-    for ((row, torque), weight) in columns.iter().zip(torque).zip(weight) {
+pub(crate) fn solve(columns: &Table, torque: &[f64], weight: &[f64], active: &[bool]) -> Fit {
+    let mut normal = Table::zeros(active.len(), active.len());
+    let mut right = vec![0.0; active.len()];
+    for ((row, torque), weight) in columns.rows().zip(torque).zip(weight) {
         let square = weight * weight;
         if square == 0.0 {
             continue;
         }
-        for (one, element) in row.iter().enumerate() {
+        for (one, (element, sums)) in row.iter().zip(normal.rows_mut()).enumerate() {
             let scaled = square * element;
             right[one] += scaled * torque;
-            for (slot, other) in normal[one].iter_mut().zip(&row[..=one]) {
+            for (slot, other) in sums.iter_mut().zip(&row[..=one]) {
                 *slot += scaled * other;
             }
         }
     }
     let (inverse, rank) = inverse(&normal, active);
-    let values = apply(&inverse, &right);
+    let values = inverse.times(&right);
     let mut fit = Fit { values, inverse, cost: 0.0, rank };
     let residual = fit.residuals(columns, torque);
     fit.cost = residual.iter().zip(weight).map(|(residual, weight)| (residual * weight).powi(2)).sum();
@@ -146,16 +140,16 @@ impl Score {
 }
 
 /// Estimates column `z` beside the parameters of `fit`. `segment` is the segment of each equation.
-pub(crate) fn score<const B: usize>(
-    fit: &Fit<B>,
-    columns: &[[f64; B]],
+pub(crate) fn score(
+    fit: &Fit,
+    columns: &Table,
     torque: &[f64],
     z: &[f64],
     weight: &[f64],
     segment: &[usize],
 ) -> Score {
-    let mut across = [0.0; B];
-    for ((row, z), weight) in columns.iter().zip(z).zip(weight) {
+    let mut across = vec![0.0; fit.values.len()];
+    for ((row, z), weight) in columns.rows().zip(z).zip(weight) {
         if *z == 0.0 {
             continue;
         }
@@ -163,9 +157,9 @@ pub(crate) fn score<const B: usize>(
             *slot += weight * weight * element * z;
         }
     }
-    let absorbed = apply(&fit.inverse, &across);
+    let absorbed = fit.inverse.times(&across);
     let column: Vec<f64> = columns
-        .iter()
+        .rows()
         .zip(z)
         .zip(weight)
         .map(|((row, z), weight)| weight * (z - dot(row, &absorbed)))
@@ -207,23 +201,25 @@ fn small_sample(sums: &[f64]) -> f64 {
 }
 
 /// Standard deviations of the parameters by the scatter of the segments.
-pub(crate) fn segment_sigma<const B: usize>(
-    fit: &Fit<B>,
-    columns: &[[f64; B]],
+pub(crate) fn segment_sigma(
+    fit: &Fit,
+    columns: &Table,
     torque: &[f64],
     weight: &[f64],
     segment: &[usize],
-) -> [f64; B] {
+) -> Vec<f64> {
     let residual = fit.residuals(columns, torque);
-    let mut sums = vec![[0.0; B]; segment.iter().max().map_or(0, |last| last + 1)];
-    for (((row, residual), weight), &segment) in columns.iter().zip(&residual).zip(weight).zip(segment) {
+    let parameters = fit.values.len();
+    let mut sums = Table::zeros(segment.iter().max().map_or(0, |last| last + 1), parameters);
+    for (((row, residual), weight), &segment) in columns.rows().zip(&residual).zip(weight).zip(segment) {
         for (slot, element) in sums[segment].iter_mut().zip(row) {
             *slot += weight * weight * residual * element;
         }
     }
-    let shifts: Vec<[f64; B]> = sums.iter().map(|sum| apply(&fit.inverse, sum)).collect();
-    core::array::from_fn(|base| {
-        let of: Vec<f64> = shifts.iter().map(|shift| shift[base]).collect();
+    let shifts = Table::of_rows(parameters, sums.rows().map(|sum| fit.inverse.times(sum)));
+    let scatter = |base: usize| {
+        let of: Vec<f64> = shifts.column(base).collect();
         (of.iter().map(|shift| shift * shift).sum::<f64>() * small_sample(&of)).sqrt()
-    })
+    };
+    (0..parameters).map(scatter).collect()
 }

@@ -14,6 +14,7 @@
 use crate::report::doubt::CauseReport;
 use crate::run::logging_errors::fit::Fit;
 use crate::run::logging_errors::rows::Equations;
+use crate::run::logging_errors::table::Table;
 use crate::run::logging_errors::{Refitted, joint_words};
 
 /// Times tried by the scan, s.
@@ -38,8 +39,8 @@ enum Kind {
 }
 
 /// A lag with the parameters fitted beside it.
-pub(crate) struct Lag<const B: usize> {
-    pub(crate) refitted: Refitted<B>,
+pub(crate) struct Lag {
+    pub(crate) refitted: Refitted,
     /// Time over its standard deviation.
     pub(crate) significance: f64,
     /// Cost of the equations of the lagging joints.
@@ -47,11 +48,11 @@ pub(crate) struct Lag<const B: usize> {
 }
 
 /// Delay of all torques, then the low-pass of all and of each joint where it fits better than a delay.
-pub(crate) fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -> Vec<Lag<B>> {
+pub(crate) fn all(equations: &Equations) -> Vec<Lag> {
     let search = Search { equations, every_row: equations.every_row() };
     let mut found = Vec::new();
-    let joints = (0..N).map(Some);
-    for joint in joints.chain((N > 1).then_some(None)) {
+    let joints = equations.joints();
+    for joint in (0..joints).map(Some).chain((joints > 1).then_some(None)) {
         let [delay, filter] = [Kind::Delay, Kind::Filter].map(|kind| search.one(kind, joint));
         let is_clearer = CLEARER * CLEARER * filter.own_cost < delay.own_cost;
         // The delay of one joint is one of the directions.
@@ -61,14 +62,14 @@ pub(crate) fn all<const N: usize, const B: usize>(equations: &Equations<N, B>) -
     found
 }
 
-struct Search<'a, const N: usize, const B: usize> {
-    equations: &'a Equations<N, B>,
-    every_row: Vec<Vec<[[f64; B]; N]>>,
+struct Search<'a> {
+    equations: &'a Equations,
+    every_row: Vec<Table>,
 }
 
-impl<const N: usize, const B: usize> Search<'_, N, B> {
+impl Search<'_> {
     /// Columns and torques with the lag of a joint, or of all.
-    fn system(&self, kind: Kind, joint: Option<usize>, time_s: f64) -> (Vec<[f64; B]>, Vec<f64>) {
+    fn system(&self, kind: Kind, joint: Option<usize>, time_s: f64) -> (Table, Vec<f64>) {
         let all = self.equations;
         match kind {
             Kind::Delay => (all.columns.clone(), all.delayed(joint, time_s)),
@@ -76,12 +77,12 @@ impl<const N: usize, const B: usize> Search<'_, N, B> {
         }
     }
 
-    fn fit(&self, kind: Kind, joint: Option<usize>, time_s: f64) -> Fit<B> {
+    fn fit(&self, kind: Kind, joint: Option<usize>, time_s: f64) -> Fit {
         let (columns, torque) = self.system(kind, joint, time_s);
         self.equations.fit(&columns, &torque, false)
     }
 
-    fn one(&self, kind: Kind, joint: Option<usize>) -> Lag<B> {
+    fn one(&self, kind: Kind, joint: Option<usize>) -> Lag {
         let all = self.equations;
         let largest_s = all.largest_delay_s();
         let cost = |time_s: f64| self.fit(kind, joint, time_s).cost;

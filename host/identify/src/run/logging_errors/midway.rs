@@ -9,6 +9,8 @@
 //! The change comes at the same share of every recording, or within one recording; the best of a grid counts.
 //! sigma is that of s with the columns of the parameters: the larger of noise and segments.
 
+use scarab::real::dot;
+
 use crate::run::logging_errors::directions::CHANCE;
 use crate::run::logging_errors::fit::Fit;
 use crate::run::logging_errors::rows::{Equations, RowSource};
@@ -53,16 +55,15 @@ impl Midway {
 }
 
 /// Normal equations' right side and power of some equations.
-#[derive(Clone, Copy)]
-struct Sums<const B: usize> {
-    right: [f64; B],
+struct Sums {
+    right: Vec<f64>,
     power: f64,
 }
 
-impl<const B: usize> Sums<B> {
-    fn new<const N: usize>(all: &Equations<N, B>, mut chosen: impl FnMut(&RowSource) -> bool) -> Self {
-        let mut sums = Self { right: [0.0; B], power: 0.0 };
-        let rows = all.columns.iter().zip(&all.torque).zip(all.weight.iter().zip(&all.sources));
+impl Sums {
+    fn new(all: &Equations, mut chosen: impl FnMut(&RowSource) -> bool) -> Self {
+        let mut sums = Self { right: vec![0.0; all.active.len()], power: 0.0 };
+        let rows = all.columns.rows().zip(&all.torque).zip(all.weight.iter().zip(&all.sources));
         for ((row, torque), (weight, source)) in rows {
             if chosen(source) {
                 let scaled = weight * weight * torque;
@@ -76,20 +77,20 @@ impl<const B: usize> Sums<B> {
     }
 }
 
-fn product<const B: usize>(fit: &Fit<B>, one: &[f64; B], other: &[f64; B]) -> f64 {
-    let rows = fit.inverse.iter().zip(one);
-    rows.map(|(row, one)| one * row.iter().zip(other).map(|(a, b)| a * b).sum::<f64>()).sum()
+fn product(fit: &Fit, one: &[f64], other: &[f64]) -> f64 {
+    dot(one, &fit.inverse.times(other))
 }
 
 /// Factor of the torques in `after` that leaves least of the misfit over the torque, and the share it
 /// explains.
-fn change<const B: usize>(plain: &Fit<B>, whole: &Sums<B>, after: &Sums<B>) -> (f64, f64) {
+fn change(plain: &Fit, whole: &Sums, after: &Sums) -> (f64, f64) {
     let share = |cost: f64, power: f64| cost / power.max(1e-300);
-    let right: [f64; B] = core::array::from_fn(|base| whole.right[base] - after.right[base]);
+    let pairs = || whole.right.iter().zip(&after.right);
+    let right: Vec<f64> = pairs().map(|(whole, after)| whole - after).collect();
     let own = after.power - product(plain, &after.right, &after.right);
     let factor = product(plain, &right, &after.right) / own.max(1e-300);
     let power = whole.power - after.power + factor * factor * after.power;
-    let total: [f64; B] = core::array::from_fn(|base| right[base] + factor * after.right[base]);
+    let total: Vec<f64> = pairs().map(|(whole, after)| whole - after + factor * after).collect();
     let cost = power - product(plain, &total, &total);
     (factor, 1.0 - share(cost, power) / share(plain.cost, whole.power))
 }
@@ -98,7 +99,7 @@ fn change<const B: usize>(plain: &Fit<B>, whole: &Sums<B>, after: &Sums<B>) -> (
 ///
 /// Searches once with the robust weights, which ignore a push, and once with every row: after a change of
 /// sign, robust weights exclude the rows after it.
-pub(crate) fn find<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
+pub(crate) fn find(all: &Equations) -> Option<Midway> {
     let robust = strongest(all);
     let whole = strongest(&all.with_equal_weights())
         .filter(|found| found.refuses() && found.change < -1.0 && found.explained > EXPLAINED_BY_SIGN);
@@ -108,14 +109,14 @@ pub(crate) fn find<const N: usize, const B: usize>(all: &Equations<N, B>) -> Opt
     }
 }
 
-fn strongest<const N: usize, const B: usize>(all: &Equations<N, B>) -> Option<Midway> {
+fn strongest(all: &Equations) -> Option<Midway> {
     let plain = all.fit(&all.columns, &all.torque, false);
     let whole = Sums::new(all, |_| true);
     let motions = all.sources.iter().map(|source| source.motion).max()? + 1;
     let scopes = std::iter::once(None).chain((0..motions).filter(|_| motions > 1).map(Some));
     let mut best: Option<(Midway, Option<usize>, f64)> = None;
     for scope in scopes {
-        for joint in (0..N).map(Some).chain((N > 1).then_some(None)) {
+        for joint in (0..all.joints()).map(Some).chain((all.joints() > 1).then_some(None)) {
             let own = Sums::new(all, |source| is_after(source, scope, joint, -1.0));
             // A gain of the whole recording is another error: a torque scale, or another machine.
             let always = if own.power < 0.999 * whole.power { change(&plain, &whole, &own).1 } else { 0.0 };

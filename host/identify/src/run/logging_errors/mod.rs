@@ -7,6 +7,7 @@
 //!
 //! | file | subject |
 //! | --- | --- |
+//! | [`regressor`] | the leg's regressor behind an interface without its size |
 //! | [`rows`] | filtered rows of whole recordings in double precision, weights |
 //! | [`fit`] | least squares, a further column beside it, both standard deviations |
 //! | [`directions`] | delay, encoder scale, torque scale, gravity, springs, drifts |
@@ -29,14 +30,17 @@ pub(crate) mod fit;
 pub(crate) mod lag;
 pub(crate) mod midway;
 pub(crate) mod noise;
+pub(crate) mod regressor;
 pub(crate) mod report;
 pub(crate) mod rows;
 pub(crate) mod samples;
 pub(crate) mod stamps;
+pub(crate) mod table;
+
+use std::sync::Arc;
 
 use nalgebra::Vector3;
-use scarab::ident::record::recorder::STILL_SPEED;
-use scarab::ident::{KernelError, RowModel};
+use scarab::ident::KernelError;
 use scarab::model::AnatomicalJoint;
 use scarab_base::number::Number;
 
@@ -45,60 +49,67 @@ use crate::report::findings::FindingReport;
 use directions::{Directions, Found};
 use encoder::{Bias, Encoders, LARGEST_NOISE, LARGEST_SHARE};
 use midway::Midway;
+use regressor::Regressor;
 use rows::{Equations, Filters, Motion};
+use table::Table;
 
 /// Recordings and the chosen model: input of all checks.
-pub(crate) struct Question<const N: usize, const B: usize> {
+#[derive(Clone)]
+pub(crate) struct Question {
     /// Model that was chosen.
-    pub(crate) model: RowModel<f64, N, B>,
+    pub(crate) regressor: Arc<dyn Regressor>,
     /// Columns that were estimated.
-    pub(crate) active: [bool; B],
+    pub(crate) active: Vec<bool>,
     /// Anatomical angles of the joints.
-    pub(crate) anatomy: [AnatomicalJoint<f64>; N],
+    pub(crate) anatomy: Vec<AnatomicalJoint<f64>>,
     /// Axis of the first joint in the base frame.
     pub(crate) axis: Vector3<f64>,
     /// Whole recordings.
-    pub(crate) motions: Vec<Motion<N>>,
+    pub(crate) motions: Vec<Motion>,
     /// Bandwidth of the rows, Hz.
     pub(crate) bandwidth_hz: f64,
     /// Base parameters of the prior.
-    pub(crate) prior: Option<[f64; B]>,
+    pub(crate) prior: Option<Vec<f64>>,
     /// Torque limit of each joint, N m.
-    pub(crate) torque_limit: [f64; N],
+    pub(crate) torque_limit: Vec<f64>,
     /// Density of each joint's torque noise, (N m)^2 s.
-    pub(crate) noise: [Option<f64>; N],
+    pub(crate) noise: Vec<Option<f64>>,
     /// Standard deviation of each base parameter by noise.
-    pub(crate) sigma: [f64; B],
+    pub(crate) sigma: Vec<f64>,
     /// Motor turns per joint turn, where the leg file states an encoder at the motor.
-    pub(crate) motor_ratio: [Option<f64>; N],
+    pub(crate) motor_ratio: Vec<Option<f64>>,
     /// How the angles were read.
-    pub(crate) encoders: Encoders<N>,
+    pub(crate) encoders: Encoders,
     /// Error of a joint's torque that is accepted, as a share of its root mean square.
     pub(crate) accepted_error: f64,
 }
 
-impl<const N: usize, const B: usize> Question<N, B> {
+impl Question {
+    /// Number of joints.
+    pub(crate) fn joints(&self) -> usize {
+        self.regressor.joints()
+    }
+
     /// Chain angles of the joints' zeros, rad.
-    pub(crate) fn zero(&self) -> [f64; N] {
-        self.anatomy.map(|joint| joint.zero_offset())
+    pub(crate) fn zero(&self) -> Vec<f64> {
+        self.anatomy.iter().map(|joint| joint.zero_offset()).collect()
     }
 
     /// This input with every column and without Stribeck friction; `None` if nothing changes.
     pub(crate) fn with_all_columns(&self) -> Option<Self> {
-        let active = core::array::from_fn(|base| base < self.model.base.rank());
-        let is_plain = self.model.stribeck.iter().all(|curve| curve.excess == 0.0);
-        if is_plain && active == self.active {
+        let without_stribeck = self.regressor.without_stribeck();
+        if without_stribeck.is_none() && self.active.iter().all(|on| *on) {
             return None;
         }
-        let model = RowModel { stribeck: scarab::ident::no_stribeck(), ..self.model.clone() };
-        Some(Self { model, active, motions: self.motions.clone(), ..*self })
+        let regressor = without_stribeck.unwrap_or_else(|| self.regressor.clone());
+        Some(Self { active: vec![true; regressor.rank()], regressor, ..self.clone() })
     }
 
     /// Equations of other motions under this model; `None` with too few rows.
     ///
     /// # Errors
     /// The filter cannot be built for the bandwidth.
-    pub(crate) fn equations(&self, motions: &[Motion<N>]) -> Result<Option<Equations<N, B>>, KernelError> {
+    pub(crate) fn equations(&self, motions: &[Motion]) -> Result<Option<Equations>, KernelError> {
         self.equations_at(motions, self.bandwidth_hz)
     }
 
@@ -108,18 +119,15 @@ impl<const N: usize, const B: usize> Question<N, B> {
     /// The filter cannot be built for the bandwidth.
     pub(crate) fn equations_at(
         &self,
-        motions: &[Motion<N>],
+        motions: &[Motion],
         bandwidth_hz: f64,
-    ) -> Result<Option<Equations<N, B>>, KernelError> {
-        let model = self.model_at(bandwidth_hz);
-        Ok(Equations::new(&model, motions, Filters::new(bandwidth_hz)?, &self.active))
+    ) -> Result<Option<Equations>, KernelError> {
+        let regressor = self.regressor_at(bandwidth_hz);
+        Ok(Equations::new(&regressor, motions, Filters::new(bandwidth_hz)?, &self.active))
     }
 
-    /// Model for rows of a lower bandwidth.
-    fn model_at(&self, bandwidth_hz: f64) -> RowModel<f64, N, B> {
-        let share = bandwidth_hz / self.bandwidth_hz;
-        let still_speed = self.model.still_speed.map(|speed| (share * speed).max(STILL_SPEED));
-        RowModel { still_speed, pulse: self.model.pulse.map(|pulse| share * pulse), ..self.model.clone() }
+    fn regressor_at(&self, bandwidth_hz: f64) -> Arc<dyn Regressor> {
+        self.regressor.with_bandwidth(bandwidth_hz / self.bandwidth_hz)
     }
 
     /// Bandwidth at which the encoders' steps are negligible, if they are not at this one.
@@ -133,41 +141,41 @@ impl<const N: usize, const B: usize> Question<N, B> {
 
     /// This input at a lower bandwidth.
     fn at(&self, bandwidth_hz: f64) -> Self {
-        Self { model: self.model_at(bandwidth_hz), motions: self.motions.clone(), bandwidth_hz, ..*self }
+        Self { regressor: self.regressor_at(bandwidth_hz), bandwidth_hz, ..self.clone() }
     }
 }
 
 /// An error that was corrected in the rows, with the parameters fitted beside it.
-pub(crate) struct Refitted<const B: usize> {
+pub(crate) struct Refitted {
     /// The error as a cause.
     pub(crate) cause: CauseReport,
     /// Part of the misfit's power that remains.
     pub(crate) remaining: f64,
     /// All parameters.
-    pub(crate) values: [f64; B],
+    pub(crate) values: Vec<f64>,
     /// Columns of the parameters.
-    pub(crate) columns: Vec<[f64; B]>,
+    pub(crate) columns: Table,
     /// Torques that they explain.
     pub(crate) torque: Vec<f64>,
 }
 
 /// Results of all checks.
-pub(crate) struct LoggingErrors<const N: usize, const B: usize> {
+pub(crate) struct LoggingErrors {
     /// Rows of all recordings.
-    pub(crate) equations: Equations<N, B>,
+    pub(crate) equations: Equations,
     /// Directions with their fits.
-    pub(crate) found: Vec<Found<B>>,
+    pub(crate) found: Vec<Found>,
     /// Directions as reported.
     pub(crate) directions: Vec<DirectionReport>,
     /// Change midway.
     pub(crate) midway: Option<Midway>,
     /// Misfit over noise of each joint; `None` where the noise is unknown.
-    pub(crate) misfit_over_noise: [Option<f64>; N],
+    pub(crate) misfit_over_noise: Vec<Option<f64>>,
     /// Standard deviation of each base parameter: noise, scatter over segments, and possible errors that were
     /// not refused.
-    pub(crate) sigma: [Sigma; B],
+    pub(crate) sigma: Vec<Sigma>,
     /// Effect of the encoders' steps; `None` where they are negligible.
-    pub(crate) encoder: Option<Bias<N, B>>,
+    pub(crate) encoder: Option<Bias>,
     /// Bandwidth at which the steps are negligible, Hz; only where they refuse.
     better_hz: Option<f64>,
 }
@@ -213,34 +221,38 @@ impl Sigma {
     }
 }
 
-impl<const N: usize, const B: usize> LoggingErrors<N, B> {
+impl LoggingErrors {
     /// Fits every direction; `None` where a joint has too few rows.
     ///
     /// # Errors
     /// The filter cannot be built for the bandwidth.
-    pub(crate) fn fit(question: &Question<N, B>) -> Result<Option<Self>, KernelError> {
+    pub(crate) fn fit(question: &Question) -> Result<Option<Self>, KernelError> {
         let Some(equations) = question.equations(&question.motions)? else { return Ok(None) };
         let found = Directions { equations: &equations, zero: question.zero(), axis: question.axis }.all();
         let fit = equations.fit(&equations.columns, &equations.torque, true);
         let scatter = equations.scatter(&fit);
         let encoder = question.encoders.bias(&equations, &fit, question.bandwidth_hz)?;
-        let better_hz = match encoder {
+        let better_hz = match &encoder {
             Some(bias) if bias.refuses() => question.calmer_hz()?,
             _ => None,
         };
-        let mut sigma: [Sigma; B] = core::array::from_fn(|base| Sigma {
-            noise: question.sigma[base],
-            segments: scatter[base],
-            encoder: encoder.map_or(0.0, |bias| bias.sigma[base]),
-            ..Sigma::default()
-        });
-        let misfit_over_noise = core::array::from_fn(|joint| {
+        let parts = question.sigma.iter().zip(&scatter).enumerate();
+        let mut sigma: Vec<Sigma> = parts
+            .map(|(base, (&noise, &segments))| Sigma {
+                noise,
+                segments,
+                encoder: encoder.as_ref().map_or(0.0, |bias| bias.sigma[base]),
+                ..Sigma::default()
+            })
+            .collect();
+        let misfit_over_noise = |joint: usize| {
             let misfit = equations.row_sigma[joint] * equations.information().sqrt();
             let noise = (question.noise[joint]? * scarab::ident::SAMPLE_RATE_HZ * equations.energy()).sqrt();
             (noise > 0.0).then(|| misfit / noise)
-        });
+        };
+        let misfit_over_noise: Vec<_> = (0..equations.joints()).map(misfit_over_noise).collect();
         let systematic = systematic(&misfit_over_noise, &equations.rows);
-        let parameters = sigma.map(|sigma| sigma.total());
+        let parameters: Vec<f64> = sigma.iter().map(Sigma::total).collect();
         let directions: Vec<DirectionReport> = found
             .iter()
             .map(|found| DirectionReport::new(found, &parameters, systematic, question))
@@ -277,7 +289,7 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
     }
 
     /// Message about steps that are too coarse.
-    fn encoder_words(&self, bias: &Bias<N, B>) -> String {
+    fn encoder_words(&self, bias: &Bias) -> String {
         let better = self.better_hz.map_or(String::new(), |hz| format!("; `--bandwidth {hz}` is better"));
         let effect = if bias.is_beyond() {
             let (joint, share) = bias.largest_noise();
@@ -303,7 +315,7 @@ impl<const N: usize, const B: usize> LoggingErrors<N, B> {
     pub(crate) fn report(&self) -> DoubtReport {
         DoubtReport {
             directions: self.directions.clone(),
-            misfit_over_noise: self.misfit_over_noise.map(Number::from).to_vec(),
+            misfit_over_noise: self.misfit_over_noise.iter().copied().map(Number::from).collect(),
             ..DoubtReport::default()
         }
     }
@@ -349,7 +361,7 @@ fn joint_words(joint: Option<usize>) -> String {
 }
 
 /// Part of the misfit's power that is not noise, 0..1; one where the noise is unknown.
-fn systematic<const N: usize>(misfit_over_noise: &[Option<f64>; N], rows: &[f64; N]) -> f64 {
+fn systematic(misfit_over_noise: &[Option<f64>], rows: &[f64]) -> f64 {
     let all: f64 = rows.iter().sum();
     let noise: f64 = misfit_over_noise
         .iter()

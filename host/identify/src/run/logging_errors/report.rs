@@ -12,12 +12,7 @@ use crate::run::logging_errors::directions::{
 impl DirectionReport {
     /// Judges a direction. `sigma` is that of the parameters, `systematic` the part of the misfit that is not
     /// noise.
-    pub fn new<const N: usize, const B: usize>(
-        found: &Found<B>,
-        sigma: &[f64; B],
-        systematic: f64,
-        question: &Question<N, B>,
-    ) -> Self {
+    pub fn new(found: &Found, sigma: &[f64], systematic: f64, question: &Question) -> Self {
         let (unit, mut factor) = found.kind.unit();
         if let Kind::Drift(Drifting::Offset, joint) = found.kind {
             // The offset of the logged torque, which a reversed joint counts the other way.

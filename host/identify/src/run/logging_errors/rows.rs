@@ -12,19 +12,17 @@
 //! Blocks of 16 rows whose residual is far above the median lose their weight, so a push is not taken for a
 //! delay. Cost: a few regressors for each 500 Hz sample. Memory: the rows.
 
-use scarab::ident::{
-    DECIMATION, Ends, FilteredRows, Kernel, KernelError, LARGEST_STILL_SHARE, LowPass, RowFilter, RowModel,
-    SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS, Smoothed,
-};
+use std::sync::Arc;
 
+use scarab::ident::{DECIMATION, Kernel, KernelError, LowPass, SAMPLE_RATE_HZ, SMOOTHING_BANDWIDTHS};
 use scarab_base::stats::{quantile, rms};
 
 use crate::run::logging_errors::fit::{Fit, Score, score, segment_sigma, solve};
+use crate::run::logging_errors::regressor::{Filtered, Instant, Regressor};
+use crate::run::logging_errors::table::Table;
 
 /// Reserved filter taps: bandwidths from 1 Hz.
-const TAPS: usize = 2048;
-/// Open outputs of that filter.
-const PENDING: usize = 205;
+pub(crate) const TAPS: usize = 2048;
 /// Rows of a block with a common weight.
 const BLOCK_ROWS: usize = 16;
 /// Residual of a block over the median, from which its weight falls, and at which it is zero.
@@ -40,15 +38,15 @@ const ROWS_PER_PARAMETER: usize = 5;
 
 /// One recording on the 500 Hz grid, chain angles and torques.
 #[derive(Clone, Debug)]
-pub struct Motion<const N: usize> {
+pub struct Motion {
     /// Duration of its training part from the start, s; infinite for a training file.
     pub(crate) training_s: f64,
     /// Start in its recording and duration of the recording, s.
     pub(crate) within_s: [f64; 2],
     /// Chain angles, rad.
-    pub(crate) position: Vec<[f64; N]>,
+    pub(crate) position: Table,
     /// Chain torques, N m.
-    pub(crate) torque: Vec<[f64; N]>,
+    pub(crate) torque: Table,
 }
 
 /// Smoothing filter and low-pass filter.
@@ -73,33 +71,28 @@ impl Filters {
 
 /// One motion after the smoothing.
 #[derive(Clone, Debug)]
-struct Part<const N: usize> {
-    instants: Vec<Smoothed<f64, N>>,
-    /// Low-passed torque at every grid point; zero where the window is incomplete.
-    filtered: [Vec<f64>; N],
+struct Part {
+    instants: Vec<Instant>,
+    /// Low-passed torque of each joint at every grid point; zero where the window is incomplete.
+    filtered: Vec<Vec<f64>>,
     /// Grid point of the first row's centre.
     first: usize,
     training_s: f64,
     within_s: [f64; 2],
 }
 
-impl<const N: usize> Part<N> {
-    fn new(motion: &Motion<N>, filters: &Filters) -> Self {
+impl Part {
+    fn new(motion: &Motion, joints: usize, filters: &Filters) -> Self {
         let (smoothing, low_pass) = (&*filters.smoothing, &*filters.low_pass);
         let reach = smoothing.reach();
-        let joints = |series: &[[f64; N]]| -> [Vec<f64>; N] {
-            core::array::from_fn(|joint| series.iter().map(|sample| sample[joint]).collect())
-        };
-        let (angles, torques) = (joints(&motion.position), joints(&motion.torque));
+        let columns =
+            |series: &Table| (0..joints).map(|joint| series.column(joint).collect::<Vec<f64>>()).collect();
+        let (angles, torques): (Vec<Vec<f64>>, Vec<Vec<f64>>) =
+            (columns(&motion.position), columns(&motion.torque));
         let samples = motion.position.len();
         let instants = (reach..samples.saturating_sub(reach)).map(|at| {
-            let mut instant = Smoothed {
-                position: [0.0; N],
-                velocity: [0.0; N],
-                acceleration: [0.0; N],
-                torque: motion.torque[at],
-            };
-            for joint in 0..N {
+            let mut instant = Instant { torque: motion.torque[at].to_vec(), ..Instant::zeros(joints) };
+            for joint in 0..joints {
                 let window = &angles[joint][at - reach..=at + reach];
                 (instant.position[joint], instant.velocity[joint], instant.acceleration[joint]) =
                     smoothing.apply(window, &[], angles[joint][at]);
@@ -107,7 +100,7 @@ impl<const N: usize> Part<N> {
             instant
         });
         let weights = low_pass.weights();
-        let filtered = torques.map(|torque| {
+        let filtered = torques.iter().map(|torque| {
             let mut filtered = vec![0.0; torque.len()];
             let windows = torque.windows(weights.len());
             for (slot, window) in filtered.iter_mut().skip(low_pass.reach()).zip(windows) {
@@ -117,27 +110,15 @@ impl<const N: usize> Part<N> {
         });
         Self {
             instants: instants.collect(),
-            filtered,
+            filtered: filtered.collect(),
             first: reach + low_pass.reach(),
             training_s: motion.training_s,
             within_s: motion.within_s,
         }
     }
 
-    fn rows<const B: usize>(
-        &self,
-        filters: &Filters,
-        model: &RowModel<f64, N, B>,
-        change: &dyn Fn(&mut Smoothed<f64, N>),
-    ) -> Vec<FilteredRows<f64, N, B>> {
-        let mut filter = Box::new(RowFilter::<f64, N, B, PENDING>::new(Ends::Whole));
-        let mut rows = Vec::with_capacity(self.instants.len() / DECIMATION + 1);
-        for instant in &self.instants {
-            let mut instant = *instant;
-            change(&mut instant);
-            rows.extend(filter.push(&filters.low_pass, &model.rows(&instant)));
-        }
-        rows
+    fn rows(&self, filters: &Filters, regressor: &dyn Regressor, change: &dyn Fn(&mut Instant)) -> Filtered {
+        regressor.filtered(&filters.low_pass, &self.instants, change)
     }
 
     /// Low-passed torque of a joint at a row, measured `late_s` later than its angle: cubic between grid
@@ -183,51 +164,52 @@ impl RowSource {
 }
 
 /// All usable rows of all joints, one equation each.
-#[derive(Clone, Debug)]
-pub(crate) struct Equations<const N: usize, const B: usize> {
+#[derive(Clone)]
+pub(crate) struct Equations {
     filters: Filters,
-    parts: Vec<Part<N>>,
-    model: RowModel<f64, N, B>,
+    parts: Vec<Part>,
+    /// Regressor of the leg.
+    pub(crate) regressor: Arc<dyn Regressor>,
     /// Columns that are estimated.
-    pub(crate) active: [bool; B],
+    pub(crate) active: Vec<bool>,
     /// Origin of each equation.
     pub(crate) sources: Vec<RowSource>,
     /// Regressor columns.
-    pub(crate) columns: Vec<[f64; B]>,
+    pub(crate) columns: Table,
     /// Low-passed torque, N m.
     pub(crate) torque: Vec<f64>,
     /// Weight of each equation, 1/(N m).
     pub(crate) weight: Vec<f64>,
     /// Standard deviation of an independent row of each joint, N m, from the residual.
-    pub(crate) row_sigma: [f64; N],
+    pub(crate) row_sigma: Vec<f64>,
     /// Rows of each joint's factor that count, in complete rows.
-    pub(crate) rows: [f64; N],
+    pub(crate) rows: Vec<f64>,
 }
 
-impl<const N: usize, const B: usize> Equations<N, B> {
+impl Equations {
     /// Filters the motions; `None` if a joint has too few rows.
     pub fn new(
-        model: &RowModel<f64, N, B>,
-        motions: &[Motion<N>],
+        regressor: &Arc<dyn Regressor>,
+        motions: &[Motion],
         filters: Filters,
-        active: &[bool; B],
+        active: &[bool],
     ) -> Option<Self> {
-        let parts: Vec<Part<N>> = motions.iter().map(|motion| Part::new(motion, &filters)).collect();
+        let joints = regressor.joints();
         let mut all = Self {
+            parts: motions.iter().map(|motion| Part::new(motion, joints, &filters)).collect(),
             filters,
-            parts,
-            model: model.clone(),
-            active: *active,
+            regressor: regressor.clone(),
+            active: active.to_vec(),
             sources: Vec::new(),
-            columns: Vec::new(),
+            columns: Table::new(regressor.rank()),
             torque: Vec::new(),
             weight: Vec::new(),
-            row_sigma: [1.0; N],
-            rows: [0.0; N],
+            row_sigma: vec![1.0; joints],
+            rows: vec![0.0; joints],
         };
         all.collect();
         let columns = active.iter().filter(|on| **on).count();
-        let enough = (0..N).all(|joint| {
+        let enough = (0..joints).all(|joint| {
             all.sources.iter().filter(|source| source.joint == joint && source.training).count()
                 >= ROWS_PER_PARAMETER * columns
         });
@@ -236,6 +218,11 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         }
         all.weigh();
         Some(all)
+    }
+
+    /// Number of joints.
+    pub(crate) fn joints(&self) -> usize {
+        self.regressor.joints()
     }
 
     /// Largest delay that can be tried, s.
@@ -259,42 +246,34 @@ impl<const N: usize, const B: usize> Equations<N, B> {
         let length = (total / CLUSTERS).clamp(SMALLEST_CLUSTER_S, LARGEST_CLUSTER_S);
         let mut clusters = 0;
         for (number, part) in self.parts.iter().enumerate() {
-            let rows = part.rows(&self.filters, &self.model, &|_| {});
-            let count = rows.len().max(1) as f64;
+            let rows = part.rows(&self.filters, &*self.regressor, &|_| {});
+            let joints = self.joints();
+            let count = (rows.torque.len() / joints).max(1) as f64;
             let pieces = (count * row_s / length).round().max(1.0);
             let start_s = part.first as f64 / SAMPLE_RATE_HZ;
-            for (row, filtered) in rows.iter().enumerate() {
-                let cluster = clusters + (row as f64 / count * pieces) as usize;
-                for joint in 0..N {
-                    if filtered.still[joint] > LARGEST_STILL_SHARE || !filtered.is_finite() {
-                        continue;
-                    }
-                    let time_s = start_s + row as f64 * row_s;
-                    self.sources.push(RowSource {
-                        motion: number,
-                        row,
-                        joint,
-                        training: time_s < part.training_s,
-                        cluster,
-                        share: (part.within_s[0] + time_s) / part.within_s[1],
-                    });
-                    self.columns.push(filtered.regressor[joint]);
-                    self.torque.push(filtered.torque[joint]);
-                }
+            for index in (0..rows.torque.len()).filter(|&index| rows.is_usable[index]) {
+                let (row, joint) = (index / joints, index % joints);
+                let time_s = start_s + row as f64 * row_s;
+                self.sources.push(RowSource {
+                    motion: number,
+                    row,
+                    joint,
+                    training: time_s < part.training_s,
+                    cluster: clusters + (row as f64 / count * pieces) as usize,
+                    share: (part.within_s[0] + time_s) / part.within_s[1],
+                });
+                self.columns.push(&rows.regressor[index]);
+                self.torque.push(rows.torque[index]);
             }
             clusters += pieces as usize;
         }
         self.weight = vec![1.0; self.torque.len()];
     }
 
-    /// Columns with a changed motion or model, for the same equations.
+    /// Columns with a changed motion or regressor, for the same equations.
     #[must_use]
-    pub(crate) fn columns_of(
-        &self,
-        model: &RowModel<f64, N, B>,
-        change: &dyn Fn(&mut Smoothed<f64, N>),
-    ) -> Vec<[f64; B]> {
-        self.columns_at(&self.sources, model, change)
+    pub(crate) fn columns_of(&self, regressor: &dyn Regressor, change: &dyn Fn(&mut Instant)) -> Table {
+        self.columns_at(&self.sources, regressor, change)
     }
 
     /// [`Self::columns_of`] for the equations of another motion with the same number of samples.
@@ -302,21 +281,27 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     pub(crate) fn columns_at(
         &self,
         sources: &[RowSource],
-        model: &RowModel<f64, N, B>,
-        change: &dyn Fn(&mut Smoothed<f64, N>),
-    ) -> Vec<[f64; B]> {
-        let rows: Vec<_> = self.parts.iter().map(|part| part.rows(&self.filters, model, change)).collect();
-        sources.iter().map(|source| rows[source.motion][source.row].regressor[source.joint]).collect()
+        regressor: &dyn Regressor,
+        change: &dyn Fn(&mut Instant),
+    ) -> Table {
+        let parts = self.parts.iter().map(|part| part.rows(&self.filters, regressor, change).regressor);
+        self.at_sources(sources, &parts.collect::<Vec<_>>())
+    }
+
+    /// Rows of the parts that belong to these equations.
+    fn at_sources(&self, sources: &[RowSource], parts: &[Table]) -> Table {
+        let row = |source: &RowSource| &parts[source.motion][source.row * self.joints() + source.joint];
+        Table::of_rows(self.regressor.rank(), sources.iter().map(row))
     }
 
     /// Smoothed motion of every recording on the 500 Hz grid, with the duration of its training part, s.
-    pub(crate) fn smoothed(&self) -> impl Iterator<Item = (&[Smoothed<f64, N>], f64)> {
+    pub(crate) fn smoothed(&self) -> impl Iterator<Item = (&[Instant], f64)> {
         let late_s = self.filters.smoothing.reach() as f64 / SAMPLE_RATE_HZ;
         self.parts.iter().map(move |part| (&part.instants[..], part.training_s - late_s))
     }
 
     /// Standard deviations of the parameters of a fit to the training motion, by the scatter of its segments.
-    pub(crate) fn scatter(&self, fit: &Fit<B>) -> [f64; B] {
+    pub(crate) fn scatter(&self, fit: &Fit) -> Vec<f64> {
         segment_sigma(fit, &self.columns, &self.torque, &self.training_weight(), &self.clusters())
     }
 
@@ -326,7 +311,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     /// Estimates column `z` beside the parameters of `fit`, which are those of these columns and torques.
-    pub(crate) fn score(&self, fit: &Fit<B>, columns: &[[f64; B]], torque: &[f64], z: &[f64]) -> Score {
+    pub(crate) fn score(&self, fit: &Fit, columns: &Table, torque: &[f64], z: &[f64]) -> Score {
         score(fit, columns, torque, z, &self.weight, &self.clusters())
     }
 
@@ -338,11 +323,6 @@ impl<const N: usize, const B: usize> Equations<N, B> {
             instant.filter(|_| source.joint == joint).map_or(0.0, |instant| instant.position[joint])
         };
         self.sources.iter().map(angle).collect()
-    }
-
-    /// Unchanged row model.
-    pub(crate) fn model(&self) -> &RowModel<f64, N, B> {
-        &self.model
     }
 
     /// Torque of all equations; that of `joint`, or of all joints, taken `late_s` after the angle.
@@ -360,48 +340,42 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     /// Columns of every row of every recording, including rows without an equation.
-    pub(crate) fn every_row(&self) -> Vec<Vec<[[f64; B]; N]>> {
-        let rows = self.parts.iter().map(|part| part.rows(&self.filters, &self.model, &|_| {}));
-        rows.map(|rows| rows.into_iter().map(|row| row.regressor).collect()).collect()
+    pub(crate) fn every_row(&self) -> Vec<Table> {
+        let rows = self.parts.iter().map(|part| part.rows(&self.filters, &*self.regressor, &|_| {}));
+        rows.map(|rows| rows.regressor).collect()
     }
 
     /// Columns of all equations; those of `joint`, or of all joints, behind a first-order low-pass of this
     /// time constant. Exact where the columns of `every_row` are straight between two rows.
-    pub(crate) fn low_passed(
-        &self,
-        every_row: &[Vec<[[f64; B]; N]>],
-        joint: Option<usize>,
-        constant_s: f64,
-    ) -> Vec<[f64; B]> {
+    pub(crate) fn low_passed(&self, every_row: &[Table], joint: Option<usize>, constant_s: f64) -> Table {
         let step_s = DECIMATION as f64 / SAMPLE_RATE_HZ;
         let (decay, lag) = ((-step_s / constant_s).exp(), constant_s / step_s);
+        let joints = self.joints();
         let behind = every_row.iter().map(|rows| {
             let mut behind = rows.clone();
-            for at in 1..rows.len() {
-                for own in (0..N).filter(|own| joint.is_none_or(|joint| joint == *own)) {
-                    for base in 0..B {
-                        let (before, now) = (rows[at - 1][own][base], rows[at][own][base]);
-                        let rise = lag * (now - before);
-                        behind[at][own][base] =
-                            now - rise + (behind[at - 1][own][base] - before + rise) * decay;
-                    }
+            let lagging = |index: &usize| joint.is_none_or(|joint| joint == index % joints);
+            for index in (joints..rows.len()).filter(lagging) {
+                let last = index - joints;
+                for base in 0..self.regressor.rank() {
+                    let (before, now) = (rows[last][base], rows[index][base]);
+                    let rise = lag * (now - before);
+                    behind[index][base] = now - rise + (behind[last][base] - before + rise) * decay;
                 }
             }
             behind
         });
-        let behind: Vec<_> = behind.collect();
-        self.sources.iter().map(|source| behind[source.motion][source.row][source.joint]).collect()
+        self.at_sources(&self.sources, &behind.collect::<Vec<_>>())
     }
 
     /// Rate of change of a series given at the equations, within each joint and motion; zero at gaps and
     /// ends.
     pub(crate) fn rate_of(&self, series: &[f64]) -> Vec<f64> {
         let step = DECIMATION as f64 / SAMPLE_RATE_HZ;
-        let mut slots: Vec<[usize; N]> = Vec::new();
+        let mut slots: Vec<Vec<usize>> = Vec::new();
         let mut starts = Vec::with_capacity(self.parts.len());
         for part in &self.parts {
             starts.push(slots.len());
-            slots.resize(slots.len() + part.instants.len() / DECIMATION + 2, [usize::MAX; N]);
+            slots.resize(slots.len() + part.instants.len() / DECIMATION + 2, vec![usize::MAX; self.joints()]);
         }
         for (index, source) in self.sources.iter().enumerate() {
             slots[starts[source.motion] + source.row][source.joint] = index;
@@ -425,7 +399,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     }
 
     /// Least squares with these columns and torques, all equations or those of the training motion.
-    pub(crate) fn fit(&self, columns: &[[f64; B]], torque: &[f64], training_only: bool) -> Fit<B> {
+    pub(crate) fn fit(&self, columns: &Table, torque: &[f64], training_only: bool) -> Fit {
         if !training_only {
             return solve(columns, torque, &self.weight, &self.active);
         }
@@ -448,7 +422,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
     /// residual.
     fn weigh(&mut self) {
         let mut trust = vec![1.0; self.torque.len()];
-        for joint in 0..N {
+        for joint in 0..self.joints() {
             let torque = self.of_joint(joint).map(|index| self.torque[index]);
             self.row_sigma[joint] = rms(torque).max(1e-9);
         }
@@ -461,7 +435,7 @@ impl<const N: usize, const B: usize> Equations<N, B> {
                 .collect();
             let fit = solve(&self.columns, &self.torque, &self.weight, &self.active);
             let residual = fit.residuals(&self.columns, &self.torque);
-            for joint in 0..N {
+            for joint in 0..self.joints() {
                 self.trust(joint, &residual, round < 5, &mut trust);
                 self.scale(joint, &residual, &trust, fit.rank);
             }

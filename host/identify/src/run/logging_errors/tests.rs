@@ -61,67 +61,71 @@ fn instant(time_s: f64) -> Smoothed<f64, 2> {
 }
 
 /// 20 s at 500 Hz; the torque of joint `j` is `late_s[j]` late.
-fn motion(late_s: [f64; 2], seed: u64) -> Motion<2> {
+fn motion(late_s: [f64; 2], seed: u64) -> Motion {
     motion_of(&model(), late_s, seed)
 }
 
-fn motion_of(model: &RowModel<f64, 2, COLUMNS>, late_s: [f64; 2], seed: u64) -> Motion<2> {
+fn motion_of(model: &RowModel<f64, 2, COLUMNS>, late_s: [f64; 2], seed: u64) -> Motion {
     let values = model.base.project(&prior_parameters(&truth()));
     let mut random = Random::new("", seed);
     let torque = |joint: usize, time_s: f64| -> f64 {
         model.rows(&instant(time_s)).regressor[joint].iter().zip(&values).map(|(y, p)| y * p).sum()
     };
-    let mut motion =
-        Motion { training_s: f64::INFINITY, within_s: [0.0, 20.0], position: Vec::new(), torque: Vec::new() };
+    let mut motion = Motion {
+        training_s: f64::INFINITY,
+        within_s: [0.0, 20.0],
+        position: Table::new(2),
+        torque: Table::new(2),
+    };
     for sample in 0..10_000 {
         let time_s = f64::from(sample) / 500.0;
-        motion.position.push(instant(time_s).position);
+        motion.position.push(&instant(time_s).position);
         motion
             .torque
-            .push([0, 1].map(|joint| torque(joint, time_s - late_s[joint]) + NOISE_NM * random.normal()));
+            .push(&[0, 1].map(|joint| torque(joint, time_s - late_s[joint]) + NOISE_NM * random.normal()));
     }
     motion
 }
 
-fn question(motions: Vec<Motion<2>>) -> Question<2, COLUMNS> {
+fn question(motions: Vec<Motion>) -> Question {
     question_of(model(), motions)
 }
 
-fn question_of(model: RowModel<f64, 2, COLUMNS>, motions: Vec<Motion<2>>) -> Question<2, COLUMNS> {
-    let prior = model.base.project(&prior_parameters(&truth()));
+fn question_of(model: RowModel<f64, 2, COLUMNS>, motions: Vec<Motion>) -> Question {
+    let prior = model.base.project(&prior_parameters(&truth()))[..model.base.rank()].to_vec();
     Question {
-        active: core::array::from_fn(|base| base < model.base.rank()),
-        anatomy: [AnatomicalJoint::identity(); 2],
+        active: vec![true; prior.len()],
+        anatomy: vec![AnatomicalJoint::identity(); 2],
         axis: Vector3::new(0.0, 0.0, 1.0),
         motions,
         bandwidth_hz: 8.0,
+        sigma: vec![0.0; prior.len()],
         prior: Some(prior),
-        torque_limit: [150.0; 2],
-        motor_ratio: [None; 2],
-        encoders: Encoders { joints: [None; 2], sample_s: 0.002 },
-        noise: [Some(NOISE_NM * NOISE_NM / 500.0); 2],
-        sigma: [0.0; COLUMNS],
+        torque_limit: vec![150.0; 2],
+        motor_ratio: vec![None; 2],
+        encoders: Encoders { joints: vec![None; 2], sample_s: 0.002 },
+        noise: vec![Some(NOISE_NM * NOISE_NM / 500.0); 2],
         accepted_error: 0.05,
-        model,
+        regressor: Arc::new(model),
     }
 }
 
-fn errors(question: &Question<2, COLUMNS>) -> LoggingErrors<2, COLUMNS> {
+fn errors(question: &Question) -> LoggingErrors {
     LoggingErrors::fit(question).expect("a bandwidth").expect("enough rows")
 }
 
 /// Refused directions by name and joint.
-fn refused(errors: &LoggingErrors<2, COLUMNS>) -> Vec<(&'static str, Option<usize>)> {
+fn refused(errors: &LoggingErrors) -> Vec<(&'static str, Option<usize>)> {
     let failed = errors.directions.iter().filter(|direction| !direction.passed);
     failed.map(|direction| (direction.name, direction.joint)).collect()
 }
 
-fn cause_of(question: &Question<2, COLUMNS>) -> CauseReport {
+fn cause_of(question: &Question) -> CauseReport {
     let errors = errors(question);
     cause::likely(question, Some(&errors), &[], &[])
 }
 
-fn estimate(errors: &LoggingErrors<2, COLUMNS>, name: &str, joint: Option<usize>) -> (f64, f64) {
+fn estimate(errors: &LoggingErrors, name: &str, joint: Option<usize>) -> (f64, f64) {
     let found = errors.directions.iter().find(|one| one.name == name && one.joint == joint);
     let found = found.expect("reported");
     (found.value.known().expect("seen"), found.sigma.known().expect("seen"))
@@ -159,11 +163,11 @@ fn a_late_torque_is_found_at_its_size_and_refused_with_its_joint() {
 }
 
 /// Motion whose torques of some joints pass a first-order low-pass.
-fn filtered(joints: &[usize], constant_s: f64) -> Motion<2> {
+fn filtered(joints: &[usize], constant_s: f64) -> Motion {
     let mut motion = motion([0.0; 2], 1);
     for &joint in joints {
         let mut state = motion.torque[0][joint];
-        for torques in &mut motion.torque {
+        for torques in motion.torque.rows_mut() {
             state += (1.0 - (-0.002 / constant_s).exp()) * (torques[joint] - state);
             torques[joint] = state;
         }
@@ -189,15 +193,15 @@ fn a_low_pass_of_the_torque_is_not_called_a_delay() {
 #[test]
 fn scales_and_gravity_are_found_at_their_size() {
     let mut scaled = motion([0.0; 2], 1);
-    scaled.position.iter_mut().for_each(|angles| angles[1] *= 1.05);
-    let errors_of = |motion: Motion<2>| errors(&question(vec![motion]));
+    scaled.position.rows_mut().for_each(|angles| angles[1] *= 1.05);
+    let errors_of = |motion: Motion| errors(&question(vec![motion]));
     let found = errors_of(scaled);
     let (value, sigma) = estimate(&found, "encoder_scale", Some(2));
     assert!((value - 5.0).abs() < 4.0 * sigma + 0.1, "{value} +- {sigma}");
     assert!(refused(&found).contains(&("encoder_scale", Some(2))));
 
     let mut gain = motion([0.0; 2], 1);
-    gain.torque.iter_mut().for_each(|torques| torques[1] *= 1.3);
+    gain.torque.rows_mut().for_each(|torques| torques[1] *= 1.3);
     let found = errors_of(gain);
     let (value, sigma) = estimate(&found, "torque_scale", Some(2));
     assert!((value - 30.0).abs() < 4.0 * sigma + 0.3, "{value} +- {sigma}");
@@ -205,7 +209,7 @@ fn scales_and_gravity_are_found_at_their_size() {
 
     let mut turned = question(vec![motion([0.0; 2], 1)]);
     let (sine, cosine) = 30_f64.to_radians().sin_cos();
-    turned.model.gravity = Vector3::new(9.81 * cosine, 9.81 * sine, 0.0);
+    turned.regressor = turned.regressor.with_gravity(&|_| Vector3::new(9.81 * cosine, 9.81 * sine, 0.0));
     let found = errors(&turned);
     let (value, sigma) = estimate(&found, "gravity", None);
     assert!((value - 30.0).abs() < 4.0 * sigma + 0.3, "{value} +- {sigma}");
@@ -239,7 +243,7 @@ fn a_sign_that_changes_midway_is_found_with_its_time() {
     for share in [0.25, 0.5, 0.75] {
         let mut flipped = motion([0.0; 2], 1);
         let from = (share * flipped.torque.len() as f64) as usize;
-        flipped.torque[from..].iter_mut().flatten().for_each(|torque| *torque = -*torque);
+        flipped.torque.rows_mut().skip(from).flatten().for_each(|torque| *torque = -*torque);
         let question = question(vec![flipped]);
         let midway = errors(&question).midway.expect("looked for");
         assert!(midway.refuses() && midway.change < -1.5, "{midway:?}");
@@ -250,7 +254,7 @@ fn a_sign_that_changes_midway_is_found_with_its_time() {
 
 #[test]
 fn units_signs_and_columns_are_named() {
-    type Damage = fn(&mut [f64; 2], &mut [f64; 2]);
+    type Damage = fn(&mut [f64], &mut [f64]);
     let cases: [(&str, Damage); 11] = [
         ("torque_sign", |_, torques| torques.iter_mut().for_each(|torque| *torque = -*torque)),
         ("torque_unit", |_, torques| torques.iter_mut().for_each(|torque| *torque *= 1000.0)),
@@ -267,7 +271,7 @@ fn units_signs_and_columns_are_named() {
     ];
     for (name, damage) in cases {
         let mut damaged = motion([0.0; 2], 1);
-        for (angles, torques) in damaged.position.iter_mut().zip(&mut damaged.torque) {
+        for (angles, torques) in damaged.position.rows_mut().zip(damaged.torque.rows_mut()) {
             damage(angles, torques);
         }
         let cause = cause_of(&question(vec![damaged]));
@@ -286,8 +290,8 @@ fn another_clock_and_a_torque_without_weight_are_named() {
         let samples = (whole.position.len() as f64 / rate) as usize - 1;
         let at = |sample: usize| (sample as f64 * rate).min(whole.position.len() as f64 - 1.0) as usize;
         damaged.position =
-            (0..samples).map(|sample| instant(sample as f64 * rate / 500.0).position).collect();
-        damaged.torque = (0..samples).map(|sample| whole.torque[at(sample)]).collect();
+            Table::of_rows(2, (0..samples).map(|sample| instant(sample as f64 * rate / 500.0).position));
+        damaged.torque = Table::of_rows(2, (0..samples).map(|sample| &whole.torque[at(sample)]));
         let cause = cause_of(&question(vec![damaged]));
         assert_eq!(cause.name, "clock", "{rate}: {}", cause.words);
         let found = cause.value.known().expect("a rate");
@@ -302,7 +306,7 @@ fn another_clock_and_a_torque_without_weight_are_named() {
 #[test]
 fn a_spring_beside_the_drive_is_found_at_its_size() {
     let mut damaged = motion([0.0; 2], 1);
-    for (angles, torques) in damaged.position.iter().zip(&mut damaged.torque) {
+    for (angles, torques) in damaged.position.rows().zip(damaged.torque.rows_mut()) {
         torques[1] += 15.0 * angles[1];
     }
     let cause = cause_of(&question(vec![damaged]));
@@ -313,10 +317,10 @@ fn a_spring_beside_the_drive_is_found_at_its_size() {
 
 /// Adds to the torque of the first joint, from the share of the recording and the undamaged torques and
 /// speeds.
-fn drifting(added: impl Fn(f64, f64, f64) -> f64) -> Question<2, COLUMNS> {
+fn drifting(added: impl Fn(f64, f64, f64) -> f64) -> Question {
     let mut damaged = motion([0.0; 2], 1);
     let count = damaged.torque.len() as f64;
-    for (index, torques) in damaged.torque.iter_mut().enumerate() {
+    for (index, torques) in damaged.torque.rows_mut().enumerate() {
         let speed = instant(index as f64 / 500.0).velocity[0];
         torques[0] += added(index as f64 / count - 0.5, torques[0], speed);
     }
@@ -325,7 +329,7 @@ fn drifting(added: impl Fn(f64, f64, f64) -> f64) -> Question<2, COLUMNS> {
 
 #[test]
 fn what_drifts_is_found_at_its_size_and_refused_beyond_the_accepted_error() {
-    let cases: [(&str, f64, Question<2, COLUMNS>); 3] = [
+    let cases: [(&str, f64, Question); 3] = [
         ("offset_drift", 6.0, drifting(|share, _, _| 6.0 * share)),
         ("torque_drift", 30.0, drifting(|share, torque, _| 0.3 * share * torque)),
         ("friction_drift", 180.0, drifting(|share, _, speed| 1.8 * share * (2.0 * speed.signum() + speed))),
@@ -343,8 +347,8 @@ fn what_drifts_is_found_at_its_size_and_refused_beyond_the_accepted_error() {
     let whole = drifting(|share, _, _| 6.0 * share).motions.remove(0);
     let piece = |from: usize, to: usize| Motion {
         within_s: [from as f64 / 500.0, 20.0],
-        position: whole.position[from..to].to_vec(),
-        torque: whole.torque[from..to].to_vec(),
+        position: Table::of_rows(2, whole.position.rows().take(to).skip(from)),
+        torque: Table::of_rows(2, whole.torque.rows().take(to).skip(from)),
         ..whole.clone()
     };
     let found = errors(&question(vec![piece(0, 4_900), piece(5_100, 10_000)]));
@@ -364,7 +368,7 @@ fn what_drifts_is_found_at_its_size_and_refused_beyond_the_accepted_error() {
 #[test]
 fn a_push_is_not_taken_for_a_direction() {
     let mut pushed = motion([0.0; 2], 1);
-    for (index, torques) in pushed.torque[4000..4300].iter_mut().enumerate() {
+    for (index, torques) in pushed.torque.rows_mut().skip(4000).take(300).enumerate() {
         let pulse = 15.0 * (std::f64::consts::PI * index as f64 / 300.0).sin();
         torques.iter_mut().for_each(|torque| *torque += pulse);
     }
@@ -376,7 +380,8 @@ fn a_push_is_not_taken_for_a_direction() {
 #[test]
 fn a_motion_with_too_few_rows_has_no_result() {
     let mut short = motion([0.0; 2], 1);
-    short.position.truncate(600);
-    short.torque.truncate(600);
+    for series in [&mut short.position, &mut short.torque] {
+        *series = Table::of_rows(2, series.rows().take(600));
+    }
     assert!(LoggingErrors::fit(&question(vec![short])).expect("a bandwidth").is_none());
 }

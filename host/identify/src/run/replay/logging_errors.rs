@@ -3,6 +3,7 @@
 mod units;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 use scarab::ident::{Choice, Reason, Record, RowModel, Solver, noise, prior_parameters};
@@ -12,15 +13,17 @@ use scarab_base::error::ToolError;
 use scarab_base::names::parameter_name;
 use scarab_base::stats::quantile;
 
-use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
+use crate::formats::leg_file::{JointFile, LegFile};
 use crate::formats::recording::Recording;
 use crate::leg::background::Background;
 use crate::report::doubt::{BandwidthReport, CauseReport, ReadAs, RecordingsReport};
 use crate::report::findings::FindingReport;
 use crate::report::{ACCEPTED, ACCEPTED_WITH_MISFIT, EXPLAINED_BY_NOISE, REFUSED, RunReport};
 use crate::run::logging_errors::encoder::{Encoder, Encoders};
+use crate::run::logging_errors::regressor::Regressor;
 use crate::run::logging_errors::rows::{Equations, Filters, Motion};
+use crate::run::logging_errors::table::Table;
 use crate::run::logging_errors::{LoggingErrors, Question, cause, noise as scatter, sample_finding};
 use crate::run::replay::cleaning::cleaned;
 use crate::run::replay::read::{Parts, Whole, parts};
@@ -67,25 +70,29 @@ fn motions<const N: usize>(
     anatomy: &[AnatomicalJoint<f64>; N],
     robust: bool,
     screening: &Screening,
-) -> (Vec<Motion<N>>, Vec<usize>) {
+) -> (Vec<Motion>, Vec<usize>) {
     let parts = |(file, whole): (usize, &Whole)| {
         let clean = if robust { cleaned::<N>(&whole.recording).0 } else { whole.recording.clone() };
         let grid = Resampled::new(&clean);
-        let chain = |values: [f64; N], of: fn(&AnatomicalJoint<f64>, f64) -> f64| {
+        let chain = |values: [f64; N], of: fn(&AnatomicalJoint<f64>, f64) -> f64| -> [f64; N] {
             core::array::from_fn(|joint| of(&anatomy[joint], values[joint]))
         };
         let motion = |points: Range<usize>| Motion {
             training_s: whole.training_s - points.start as f64 * GRID_S,
             within_s: [points.start as f64 * GRID_S, grid.len() as f64 * GRID_S],
-            position: points
-                .clone()
-                .filter_map(|point| grid.position_rad::<N>(point))
-                .map(|values| chain(values, |joint, angle| joint.angle_to_chain(angle)))
-                .collect(),
-            torque: points
-                .filter_map(|point| grid.torque_nm::<N>(point))
-                .map(|values| chain(values, |joint, torque| joint.to_chain(torque)))
-                .collect(),
+            position: Table::of_rows(
+                N,
+                points
+                    .clone()
+                    .filter_map(|point| grid.position_rad::<N>(point))
+                    .map(|values| chain(values, |joint, angle| joint.angle_to_chain(angle))),
+            ),
+            torque: Table::of_rows(
+                N,
+                points
+                    .filter_map(|point| grid.torque_nm::<N>(point))
+                    .map(|values| chain(values, |joint, torque| joint.to_chain(torque))),
+            ),
         };
         let mut parts = Vec::new();
         let mut begin = 0;
@@ -104,15 +111,16 @@ fn motions<const N: usize>(
 }
 
 /// Encoders of the recordings' angles: the coarsest of each joint, at the median time of the samples.
-pub(super) fn encoders<const N: usize>(wholes: &[Whole], leg: &LegFile) -> Encoders<N> {
+pub(super) fn encoders(wholes: &[Whole], leg: &LegFile) -> Encoders {
     let steps_s = wholes.iter().map(|whole| whole.recording.median_step_s()).collect();
-    let joints = core::array::from_fn(|joint| {
-        let described_rad = leg.joints.get(joint)?.encoder.step_rad();
+    let joint = |(joint, described): (usize, &JointFile)| {
+        let described_rad = described.encoder.step_rad();
         let found = wholes.iter().filter_map(|whole| {
             Encoder::detect(&whole.recording.joints.get(joint)?.position_rad, described_rad)
         });
         found.max_by(|one, other| one.step_rad.total_cmp(&other.step_rad))
-    });
+    };
+    let joints = leg.joints.iter().enumerate().map(joint).collect();
     Encoders { joints, sample_s: quantile(steps_s, 0.5) }
 }
 
@@ -127,13 +135,14 @@ pub(super) fn chosen_bandwidth<const N: usize, const B: usize>(
     let Parts { wholes, screening, .. } = parts(recordings, options, leg, &[1.0; N])?;
     let robust = options.estimator == scarab::ident::Estimator::Robust;
     let (motions, _) = motions(&wholes, &anatomy::<N>(leg)?, robust, &screening);
-    let encoders: Encoders<N> = encoders(&wholes, leg);
-    let active = core::array::from_fn(|base| base < background.model.base.rank());
+    let encoders = encoders(&wholes, leg);
+    let active = vec![true; background.model.base.rank()];
     let largest_hz = TRUSTED_BANDWIDTH / encoders.sample_s;
     let rows = |bandwidth_hz| {
         let mut model = background.model.clone();
         encoders.describe(leg, bandwidth_hz, &mut model);
-        Ok(Equations::new(&model, &motions, Filters::new(bandwidth_hz)?, &active))
+        let regressor: Arc<dyn Regressor> = Arc::new(model);
+        Ok(Equations::new(&regressor, &motions, Filters::new(bandwidth_hz)?, &active))
     };
     encoders.bandwidth_hz(largest_hz, rows).map_err(|error| bandwidth_error(options.bandwidth_hz, error))
 }
@@ -218,8 +227,8 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
     /// Likely cause of a refusal, with its remedy. Takes `suspected`, a current, where it is the cause.
     fn likely_cause(
         &self,
-        question: &Question<N, B>,
-        errors: Option<&LoggingErrors<N, B>>,
+        question: &Question,
+        errors: Option<&LoggingErrors>,
         findings: &[FindingReport],
         suspected: &mut Option<&CauseReport>,
     ) -> CauseReport {
@@ -245,18 +254,18 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
     }
 
     /// Adds the scatter between recordings to sigma.
-    fn between_recordings(&self, errors: &mut LoggingErrors<N, B>, file_of: &[usize]) -> RecordingsReport {
+    fn between_recordings(&self, errors: &mut LoggingErrors, file_of: &[usize]) -> RecordingsReport {
         let (count, scatter) = leave_one_out(&errors.equations, file_of);
         let Some(scatter) = scatter else { return RecordingsReport { count, sigma: Vec::new() } };
-        for (sigma, scatter) in errors.sigma.iter_mut().zip(scatter) {
-            sigma.recordings = scatter;
+        for (sigma, scatter) in errors.sigma.iter_mut().zip(&scatter) {
+            sigma.recordings = *scatter;
         }
         let kept = self.background.kept(&self.solver.record().selection.dropped);
         RecordingsReport { count, sigma: kept.map(|base| scatter[base].into()).collect() }
     }
 
     /// Input of the checks, and the file of each of its motions.
-    fn question(&self) -> (Question<N, B>, Vec<usize>) {
+    fn question(&self) -> (Question, Vec<usize>) {
         let (background, solver) = (self.background, self.solver);
         let dropped = &solver.record().selection.dropped;
         let rank = background.model.base.rank();
@@ -273,35 +282,33 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         // The recorded torque includes the load's.
         let prior = background.prior.as_ref().map(|prior| {
             let alone = model.base.project(&prior_parameters(prior));
-            core::array::from_fn(|base| alone[base] + load[base])
+            (0..rank).map(|base| alone[base] + load[base]).collect()
         });
         let estimate = solver.estimate();
         let robust = self.options.estimator == scarab::ident::Estimator::Robust;
         let (motions, file_of) = motions(self.wholes, self.anatomy, robust, self.screening);
         let question = Question {
-            active: core::array::from_fn(|base| base < rank && !dropped[base]),
-            anatomy: *self.anatomy,
+            active: (0..rank).map(|base| !dropped[base]).collect(),
+            anatomy: self.anatomy.to_vec(),
             axis: Vector3::new(0.0, -sine, cosine),
             motions,
             bandwidth_hz: self.options.bandwidth_hz,
             prior,
-            torque_limit: core::array::from_fn(|joint| {
-                self.leg.joints.get(joint).map_or(f64::INFINITY, |joint| joint.torque_limit_nm)
-            }),
-            noise: self.noise,
-            motor_ratio: core::array::from_fn(|joint| {
-                self.options.import.as_ref()?.drives.get(joint)?.motor_ratio
-            }),
+            torque_limit: self.leg.joints.iter().map(|joint| joint.torque_limit_nm).collect(),
+            noise: self.noise.to_vec(),
+            motor_ratio: (0..N)
+                .map(|joint| self.options.import.as_ref()?.drives.get(joint)?.motor_ratio)
+                .collect(),
             encoders: encoders(self.wholes, self.leg),
             accepted_error: self.options.accept_error_percent / 100.0,
-            sigma: core::array::from_fn(|base| estimate.sigma(base).map_or(0.0, f64::from)),
-            model,
+            sigma: (0..rank).map(|base| estimate.sigma(base).map_or(0.0, f64::from)).collect(),
+            regressor: Arc::new(model),
         };
         (question, file_of)
     }
 
     /// Replaces the reported standard deviations by the larger ones.
-    fn widen(&self, run: &mut RunReport, errors: &LoggingErrors<N, B>) {
+    fn widen(&self, run: &mut RunReport, errors: &LoggingErrors) {
         let kept: Vec<usize> = self.background.kept(&self.solver.record().selection.dropped).collect();
         let mut ratios = vec![1.0; kept.len()];
         for ((base, report), ratio) in kept.iter().zip(&mut run.base_parameters).zip(&mut ratios) {

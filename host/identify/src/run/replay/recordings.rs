@@ -13,10 +13,7 @@ use crate::run::logging_errors::rows::Equations;
 
 /// Number of training recordings, and the standard deviation of each base parameter; `None` if one recording
 /// alone determines a parameter.
-pub(super) fn leave_one_out<const N: usize, const B: usize>(
-    equations: &Equations<N, B>,
-    file_of: &[usize],
-) -> (usize, Option<[f64; B]>) {
+pub(super) fn leave_one_out(equations: &Equations, file_of: &[usize]) -> (usize, Option<Vec<f64>>) {
     let weight = equations.training_weight();
     let of_rows: Vec<usize> = equations.sources.iter().map(|source| file_of[source.motion]).collect();
     let trains = |file: &usize| of_rows.iter().zip(&weight).any(|(own, weight)| own == file && *weight > 0.0);
@@ -38,10 +35,10 @@ pub(super) fn leave_one_out<const N: usize, const B: usize>(
         return (files.len(), None);
     }
     let count = files.len() as f64;
-    let sigma = core::array::from_fn(|base| {
+    let sigma = |base: usize| {
         let mean = fits.iter().map(|fit| fit.values[base]).sum::<f64>() / count;
         let squares: f64 = fits.iter().map(|fit| (fit.values[base] - mean).powi(2)).sum();
         ((count - 1.0) / count * squares).sqrt()
-    });
-    (files.len(), Some(sigma))
+    };
+    (files.len(), Some((0..equations.active.len()).map(sigma).collect()))
 }

@@ -10,6 +10,7 @@
 //!
 //! Without a prior nothing shows the scale of the torques, so nothing is suspected.
 
+use scarab::real::dot;
 use scarab_base::number::Number;
 
 use crate::formats::recording::import::Import;
@@ -68,17 +69,17 @@ fn apply(readings: &mut [Reading], read: ReadAs, joint: Option<usize>) -> usize 
 
 /// Currents that were read as torques, by the scale of the prior. `angles` is how the equations read the
 /// angles, where it is not as stated.
-pub(super) fn current<const N: usize, const B: usize>(
-    question: &Question<N, B>,
-    equations: &Equations<N, B>,
+pub(super) fn current(
+    question: &Question,
+    equations: &Equations,
     import: Option<&Import>,
     angles: Option<ReadAs>,
 ) -> Option<CauseReport> {
     let import = import?;
     let is_torque = |joint: usize| !import.columns.contains_key(&Signal::Current(joint + 1));
-    let scales = scales(equations, &question.prior?);
+    let scales = scales(equations, question.prior.as_ref()?);
     let is_alike = scales.iter().all(|scale| scale.ratio > 0.0 && scale.likeness >= ALIKE);
-    if !is_alike || !(0..N).all(is_torque) {
+    if !is_alike || !(0..question.joints()).all(is_torque) {
         return None;
     }
     let ratios: Vec<String> = scales.iter().map(|scale| format!("{:.3}", scale.ratio)).collect();
@@ -156,19 +157,20 @@ struct Scale {
     likeness: f64,
 }
 
-fn scales<const N: usize, const B: usize>(equations: &Equations<N, B>, prior: &[f64; B]) -> [Scale; N] {
-    core::array::from_fn(|joint| {
+fn scales(equations: &Equations, prior: &[f64]) -> Vec<Scale> {
+    let of_joint = |joint: usize| {
         let (mut along, mut measured, mut expected) = (0.0, 0.0, 0.0);
-        for ((source, torque), row) in equations.sources.iter().zip(&equations.torque).zip(&equations.columns)
-        {
+        let rows = equations.sources.iter().zip(&equations.torque).zip(equations.columns.rows());
+        for ((source, torque), row) in rows {
             if source.joint == joint {
-                let guess: f64 = row.iter().zip(prior).map(|(element, value)| element * value).sum();
+                let guess = dot(row, prior);
                 along += guess * torque;
                 measured += torque * torque;
                 expected += guess * guess;
             }
         }
         let product: f64 = measured * expected;
-        Scale { ratio: along / expected.max(1e-300), likeness: along / product.sqrt().max(1e-300) }
-    })
+        Scale { ratio: along / f64::max(expected, 1e-300), likeness: along / product.sqrt().max(1e-300) }
+    };
+    (0..equations.joints()).map(of_joint).collect()
 }
