@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::{BaseReport, RunReport};
-use scarab_identify::with_leg_size;
 use scarab_rig::identify::identify_one;
 use scarab_rig::options::SimulationOptions;
 use scarab_rig::traced::report::run_report;
@@ -135,7 +134,7 @@ pub fn interrupts(session: &Session) -> BTreeMap<&'static str, InterruptReport> 
 /// trace does not contain the truth, and the plant of this model has less noise than a machine.
 fn errors(leg: &LegFile, run: &RunReport, seed: u64) -> Result<BTreeMap<String, f64>, ToolError> {
     let options = &SimulationOptions::with_seed(seed);
-    let (simulated, _) = with_leg_size!(leg, identify_one(leg, options, None))?;
+    let (simulated, _) = identify_one(leg, options, None)?;
     let pairs = run.base_parameters.iter().filter_map(|base| {
         let other = simulated.base_parameters.iter().find(|other| other.name == base.name)?;
         let error = base.value.known()? - other.truth.known()?;

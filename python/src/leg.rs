@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use scarab::ident::{Estimator, Plan, prior_parameters};
-use scarab::leg::{LoggedSample, Segment};
 use scarab::model::{INERTIAL_PARAMETERS, LegParameters, PARAMETERS_PER_JOINT, Parameter, Payload};
 use scarab_base::error::ToolError;
 use scarab_base::files;
@@ -22,12 +21,10 @@ use scarab_identify::leg::placed_mass::PlacedMass;
 use scarab_identify::leg::setup::{PriorChoice, links};
 use scarab_identify::leg::states::Angles;
 use scarab_identify::run::replay::{Recordings, ReplayOptions, replay};
-use scarab_identify::with_leg_size;
 use scarab_rig::excite::assumption::Assumption;
 use scarab_rig::excite::bench::ExciteOptions;
 use scarab_rig::excite::design::DesignOptions;
 use scarab_rig::excite::run::{check, excite};
-use scarab_rig::identify::recorded;
 use scarab_rig::options::{DriveModel, SimulationOptions};
 use scarab_rig::simulate::{SimulatedRun, simulate};
 
@@ -276,8 +273,7 @@ impl Leg {
             ..ReplayOptions::from_leg(&leg)
         };
         let (leg, recordings, options) = (&leg, &recordings, &options);
-        let replayed =
-            compute(py, || with_leg_size!(leg, replay(leg, recordings, options)))?.map_err(raised)?;
+        let replayed = compute(py, || replay(leg, recordings, options))?.map_err(raised)?;
         Identification::from_replay(py, leg.clone(), replayed)
     }
 
@@ -307,7 +303,7 @@ impl Leg {
         };
         options.check().map_err(|reason| raised(ToolError::Input(reason)))?;
         let leg = &self.file;
-        let excited = compute(py, || with_leg_size!(leg, excite(leg, options)))?.map_err(raised)?;
+        let excited = compute(py, || excite(leg, options))?.map_err(raised)?;
         Motion::from_design(leg.clone(), excited)
     }
 
@@ -332,8 +328,7 @@ impl Leg {
             ..SimulationOptions::with_seed(seed)
         };
         let leg = &self.file;
-        let (identification, recordings) =
-            compute(py, || with_leg_size!(leg, simulated(leg, options)))?.map_err(raised)?;
+        let (identification, recordings) = compute(py, || simulated(leg, options))?.map_err(raised)?;
         let identification =
             Identification::from_simulation(py, leg.clone(), identification.0, identification.1)?;
         let mut recordings = recordings.iter();
@@ -476,20 +471,10 @@ fn flat_parameters<const N: usize>(leg: &LegFile, of: Option<&str>) -> PyResult<
 type Simulated =
     ((scarab_identify::report::RunReport, scarab_identify::report::series::Series), Vec<Recording>);
 
-fn simulated<const N: usize, const B: usize>(
-    leg: &LegFile,
-    options: &SimulationOptions,
-) -> Result<Simulated, ToolError> {
+fn simulated(leg: &LegFile, options: &SimulationOptions) -> Result<Simulated, ToolError> {
     if let Some(motion) = &options.excitation {
-        check::<N, B>(leg, Path::new("motion"), motion, &[])?;
+        check(leg, Path::new("motion"), motion, &[])?;
     }
-    let SimulatedRun { report, log, series }: SimulatedRun<N> = simulate::<N, B>(leg, options)?;
-    let of = |segment: Segment| -> Vec<LoggedSample<N>> {
-        log.iter().filter(|logged| logged.segment == Some(segment)).copied().collect()
-    };
-    let segments = std::iter::once(Segment::Training).chain((0..=u8::MAX).map(Segment::Validation));
-    let recordings = segments
-        .map(|segment| recorded(Path::new("simulation"), leg, &of(segment)))
-        .take_while(|recording| !recording.time_s.is_empty());
-    Ok(((report, series), recordings.collect()))
+    let SimulatedRun { report, recordings, series } = simulate(leg, options)?;
+    Ok(((report, series), recordings))
 }

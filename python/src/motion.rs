@@ -1,15 +1,12 @@
 //! Class `Motion`: an exciting motion.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use scarab_base::error::{FileError, ToolError};
 use scarab_base::files;
 use scarab_identify::formats::excitation::Excitation;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::formats::motion_samples::{MotionSamples, SampleRate};
-use scarab_identify::with_leg_size;
-use scarab_rig::excite::assumption::{Assumption, assumed};
 use scarab_rig::excite::run::{Excited, check};
 
 use crate::arrays::{object, shaped, vector};
@@ -46,7 +43,7 @@ impl Motion {
     #[staticmethod]
     fn load(path: PathBuf, leg: &Leg) -> PyResult<Self> {
         let (leg, excitation) = (&leg.file, Excitation::load(&path).map_err(raised)?);
-        with_leg_size!(leg, checked(leg, &path, &excitation)).map_err(raised)?;
+        check(leg, &path, &excitation, &[]).map_err(raised)?;
         Ok(Self { leg: leg.clone(), excitation, report: None })
     }
 
@@ -90,18 +87,5 @@ impl Motion {
 
     fn __repr__(&self) -> String {
         format!("<Motion of '{}', {} s>", self.leg.name, self.excitation.duration_s())
-    }
-}
-
-/// Refuses a motion of another leg, and one beyond the leg's limits. Those of torque need its bodies.
-fn checked<const N: usize, const B: usize>(
-    leg: &LegFile,
-    path: &Path,
-    motion: &Excitation,
-) -> Result<(), ToolError> {
-    motion.table::<N>(leg).map_err(|reason| FileError::new(path.display(), reason))?;
-    match assumed(leg, Assumption::Best) {
-        Ok(_) => check::<N, B>(leg, path, motion, &[]),
-        Err(_) => Ok(()),
     }
 }

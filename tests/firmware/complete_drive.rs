@@ -17,7 +17,7 @@ fn options(drive: DriveModel) -> SimulationOptions {
 }
 
 fn identified(options: &SimulationOptions) -> RunReport {
-    identify_one::<2, 13>(&leg(), options, None).expect("it runs").0
+    identify_one(&leg(), options, None).expect("it runs").0
 }
 
 /// Name of each base parameter, and its deviation from that of ideal drives in sigma of the latter.
@@ -56,7 +56,7 @@ fn twenty_complete_drives_agree_with_ideal_ones_within_half_a_sigma() {
             ..SimulationOptions::with_seed(seed)
         };
         let options: Vec<_> = (1..=20).map(perturbed).collect();
-        identify_many::<2, 13>(&leg(), &options).expect("they run")
+        identify_many(&leg(), &options).expect("they run")
     };
     let ideal = runs(DriveModel::Ideal, &[]);
     let compared = |full: &[RunReport]| -> Vec<(String, f64)> {

@@ -11,7 +11,6 @@
 //! use scarab_identify::formats::leg_file::LegFile;
 //! use scarab_identify::formats::recording::{Recording, import::Import};
 //! use scarab_identify::run::replay::{Recordings, ReplayOptions, replay};
-//! use scarab_identify::with_leg_size;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let leg = &LegFile::load("my-leg.toml")?;
@@ -19,7 +18,7 @@
 //! let recordings = &Recordings { training: vec![read], ..Recordings::default() };
 //! // Two thirds train, the rest validates.
 //! let options = &ReplayOptions { split: Some(0.67), ..ReplayOptions::from_leg(leg) };
-//! let found = with_leg_size!(leg, replay(leg, recordings, options))?.run;
+//! let found = replay(leg, recordings, options)?.run;
 //! println!("{}: {:?} % of the held-out torque", found.verdict, found.validation[0].percent_of_rms.known());
 //! for base in &found.base_parameters {
 //!     println!("{}: {:?} +- {:?} {}", base.name, base.value.known(), base.sigma.known(), base.unit);

@@ -4,38 +4,32 @@ use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use scarab::leg::{LoggedSample, Segment};
+use scarab::leg::LoggedSample;
 use scarab::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
 use scarab_base::error::ToolError;
-use scarab_base::files::NewFile;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::formats::recording::{JointSeries, Recording};
 use scarab_identify::report::RunReport;
 use scarab_identify::report::series::Series;
 
 use crate::options::SimulationOptions;
-use crate::simulate::{SimulatedRun, simulate};
+use crate::simulate::simulate;
 
 /// Runs one identification, with curves on request; writes its log if a path is given.
-pub fn identify_one<const N: usize, const B: usize>(
+pub fn identify_one(
     leg: &LegFile,
     options: &SimulationOptions,
     log: Option<&Path>,
 ) -> Result<(RunReport, Series), ToolError> {
-    let run: SimulatedRun<N> = simulate::<N, B>(leg, options)?;
-    if let Some(path) = log {
-        let training: Vec<_> =
-            run.log.iter().filter(|logged| logged.segment == Some(Segment::Training)).copied().collect();
-        write_log(path, leg, &training)?;
+    let run = simulate(leg, options)?;
+    if let (Some(path), Some(training)) = (log, run.recordings.first()) {
+        training.save(path)?;
     }
     Ok((run.report, run.series))
 }
 
 /// Runs one identification per seed, in parallel.
-pub fn identify_many<const N: usize, const B: usize>(
-    leg: &LegFile,
-    options: &[SimulationOptions],
-) -> Result<Vec<RunReport>, ToolError> {
+pub fn identify_many(leg: &LegFile, options: &[SimulationOptions]) -> Result<Vec<RunReport>, ToolError> {
     let progress = ProgressBar::new(options.len() as u64);
     if let Ok(style) =
         ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {elapsed} elapsed, {eta} left")
@@ -45,7 +39,7 @@ pub fn identify_many<const N: usize, const B: usize>(
     let runs = options
         .par_iter()
         .map(|options| {
-            let run = simulate::<N, B>(leg, options).map(|run| run.report);
+            let run = simulate(leg, options).map(|run| run.report);
             progress.inc(1);
             run
         })
@@ -54,20 +48,8 @@ pub fn identify_many<const N: usize, const B: usize>(
     runs
 }
 
-/// Writes samples of a log in the format of `replay`.
-pub fn write_log<const N: usize>(
-    path: &Path,
-    leg: &LegFile,
-    log: &[LoggedSample<N>],
-) -> Result<(), ToolError> {
-    let mut out = NewFile::create(path)?;
-    let recording = recorded(path, leg, log);
-    recording.write(&mut out).map_err(|error| ToolError::cannot_write(path, &error))?;
-    out.finish()
-}
-
 /// Recording of samples of a log: anatomical angles and torques. `name` stands for the file.
-pub fn recorded<const N: usize>(name: &Path, leg: &LegFile, log: &[LoggedSample<N>]) -> Recording {
+pub(crate) fn recorded<const N: usize>(name: &Path, leg: &LegFile, log: &[LoggedSample<N>]) -> Recording {
     let mut recording = Recording {
         file: name.to_owned(),
         time_s: Vec::with_capacity(log.len()),

@@ -16,6 +16,7 @@ use scarab::servo::SERVO_RATE_HZ;
 use scarab::units::Second;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::{LegFile, PushesFile};
+use scarab_identify::with_leg_size;
 
 use crate::identified::identify;
 use crate::options::SimulationOptions;
@@ -181,7 +182,14 @@ impl<'a, const N: usize, const B: usize> Walk<'a, N, B> {
 }
 
 /// Runs one seed: identification, false alarms, change.
-pub fn watch<const N: usize, const B: usize>(
+///
+/// # Errors
+/// The leg file cannot be used.
+pub fn watch(leg: &LegFile, options: &MonitorOptions) -> Result<MonitorRun, ToolError> {
+    with_leg_size!(leg, watch_sized(leg, options))
+}
+
+fn watch_sized<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &MonitorOptions,
 ) -> Result<MonitorRun, ToolError> {

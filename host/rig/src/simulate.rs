@@ -1,16 +1,20 @@
 //! Complete simulated run: the firmware's leg against the plant, with data that only a simulation provides.
 
+use std::path::Path;
 use std::time::Instant;
 
 use hal_sim::world::TICK_S;
-use scarab::leg::{Activity, ControlOutput, ControlRequest, IdentifyPhase, LoggedSample, Step};
+use scarab::leg::{Activity, ControlOutput, ControlRequest, IdentifyPhase, LoggedSample, Segment, Step};
 use scarab::motion::Periodic;
 use scarab::real::sqrt;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
+use scarab_identify::formats::recording::Recording;
 use scarab_identify::report::series::Series;
 use scarab_identify::report::{RunReport, TrackingReport};
+use scarab_identify::with_leg_size;
 
+use crate::identify::recorded;
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
 use crate::shaking::Shaking;
@@ -22,11 +26,11 @@ const LONGEST_RUN_S: f64 = 300.0;
 
 /// Result of a simulated run.
 #[derive(Clone, Debug)]
-pub struct SimulatedRun<const N: usize> {
+pub struct SimulatedRun {
     /// The report.
     pub report: RunReport,
-    /// Samples of the motions identified from and predicted.
-    pub log: Vec<LoggedSample<N>>,
+    /// The motion identified from, then those that were predicted.
+    pub recordings: Vec<Recording>,
     /// Curves; empty unless requested.
     pub series: Series,
 }
@@ -46,10 +50,17 @@ impl<const N: usize, const B: usize> Observer<N, B> for () {
 }
 
 /// Drives, identifies, validates and tracks one simulated leg.
-pub fn simulate<const N: usize, const B: usize>(
+///
+/// # Errors
+/// The leg file cannot be used, or a perturbation does not fit.
+pub fn simulate(leg: &LegFile, options: &SimulationOptions) -> Result<SimulatedRun, ToolError> {
+    with_leg_size!(leg, simulate_sized(leg, options))
+}
+
+fn simulate_sized<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &SimulationOptions,
-) -> Result<SimulatedRun<N>, ToolError> {
+) -> Result<SimulatedRun, ToolError> {
     simulate_observed::<N, B>(leg, options, &mut ())
 }
 
@@ -58,7 +69,7 @@ pub fn simulate_observed<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &SimulationOptions,
     observer: &mut impl Observer<N, B>,
-) -> Result<SimulatedRun<N>, ToolError> {
+) -> Result<SimulatedRun, ToolError> {
     let started = Instant::now();
     let wrong = options.perturbations.as_slice();
     let simulated = perturb::simulated(leg, wrong)?;
@@ -66,15 +77,25 @@ pub fn simulate_observed<const N: usize, const B: usize>(
     perturb::configure(&mut context, wrong)?;
     observer.begin(&context);
     let Driven { pair, mut watch, stopped, shaking } = drive(leg, &simulated, &context, options, observer)?;
-    let mut run = if stopped.is_some() {
+    let (mut report, series) = if stopped.is_some() {
         watch.report(&pair, options, Vec::new(), stopped, started)?
     } else {
         let tracking = track(&context, &pair);
         watch.scale = Some(scale::find(&context, &pair, options.payload.as_ref(), options.load.as_ref())?);
         watch.report(&pair, options, tracking, None, started)?
     };
-    shaking.explain(&simulated, &mut run.report);
-    Ok(run)
+    shaking.explain(&simulated, &mut report);
+    Ok(SimulatedRun { report, recordings: recordings(leg, &watch.log), series })
+}
+
+/// Recordings of a log: the training motion, then each validation motion.
+fn recordings<const N: usize>(leg: &LegFile, log: &[LoggedSample<N>]) -> Vec<Recording> {
+    let segments = core::iter::once(Segment::Training).chain((0..=u8::MAX).map(Segment::Validation));
+    let of = |segment: Segment| -> Vec<LoggedSample<N>> {
+        log.iter().filter(|logged| logged.segment == Some(segment)).copied().collect()
+    };
+    let recorded = segments.map(|segment| recorded(Path::new("simulation"), leg, &of(segment)));
+    recorded.take_while(|recording| !recording.time_s.is_empty()).collect()
 }
 
 /// Leg after one identification, with its observation.

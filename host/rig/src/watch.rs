@@ -13,10 +13,10 @@ use scarab::model::Parameter;
 use scarab::real::sqrt;
 use scarab_base::error::ToolError;
 use scarab_base::names::VALIDATION_NAMES;
-use scarab_identify::report::TrackingReport;
 use scarab_identify::report::findings::FindingReport;
 use scarab_identify::report::scale::ScaleReport;
 use scarab_identify::report::series::{Reader, Role, Series};
+use scarab_identify::report::{RunReport, TrackingReport};
 use scarab_identify::run::analysis::{Circumstances, Costs, Motion as RecordedMotion, TruthFit};
 use scarab_identify::run::information::Information;
 use scarab_identify::run::scale::{Scale, loaded};
@@ -24,7 +24,6 @@ use scarab_identify::run::scale::{Scale, loaded};
 use crate::options::SimulationOptions;
 use crate::pair::{Context, PENDING, Pair, TAPS};
 use crate::scale;
-use crate::simulate::SimulatedRun;
 
 /// A logged sample is the mean of eight ticks and begins with the motion's first.
 const MIDDLE_OF_A_SAMPLE_TICKS: f64 = 3.5;
@@ -127,7 +126,8 @@ pub struct Watch<'a, const N: usize, const B: usize> {
     segment: Option<Segment>,
     training_rows: Vec<FilteredRows<f32, N, B>>,
     validation_rows: [Vec<FilteredRows<f32, N, B>>; VALIDATION_NAMES.len()],
-    log: Vec<LoggedSample<N>>,
+    /// Logged samples, in order.
+    pub(crate) log: Vec<LoggedSample<N>>,
     information: Information<N>,
     costs: Option<Costs<B>>,
     excess: Vec<(u32, f64)>,
@@ -332,13 +332,13 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
 
     /// Report after the verdict. If the drive `stopped` before, the result is rejected as input.
     pub fn report(
-        mut self,
+        &mut self,
         pair: &Pair<N, B>,
         options: &SimulationOptions,
         tracking: Vec<TrackingReport>,
         stopped: Option<String>,
         started: Instant,
-    ) -> Result<SimulatedRun<N>, ToolError> {
+    ) -> Result<(RunReport, Series), ToolError> {
         let rows = self.chain.start();
         self.keep(rows);
         let identification = pair.leg.identification();
@@ -387,6 +387,6 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         let constants =
             self.context.configuration.joints.map(|joint| f64::from(joint.scale.torque_per_ampere.0));
         report.scale = scale.map_or_else(ScaleReport::default, |scale| ScaleReport::new(&scale, &constants));
-        Ok(SimulatedRun { report, log: self.log, series })
+        Ok((report, series))
     }
 }

@@ -120,12 +120,11 @@ fn the_noise_free_bias_is_below_a_seventh_of_sigma() {
 fn a_logged_run_replays_to_the_same_base_parameters() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("whole_leg_log.csv");
     let leg = default_leg();
-    let (report, _) =
-        identify_one::<JOINTS, BASE>(&leg, &SimulationOptions::with_seed(3), Some(&path)).expect("it runs");
+    let (report, _) = identify_one(&leg, &SimulationOptions::with_seed(3), Some(&path)).expect("it runs");
     let read = Recording::read(&path, &Import::plain(2)).expect("the tool reads its own log");
     let recordings = Recordings { training: vec![read], ..Recordings::default() };
     let options = ReplayOptions { swarm_seed: 3, ..ReplayOptions::from_leg(&leg) };
-    let replayed = replay::<JOINTS, BASE>(&leg, &recordings, &options).expect("it is identified");
+    let replayed = replay(&leg, &recordings, &options).expect("it is identified");
     for (online, offline) in report.base_parameters.iter().zip(&replayed.run.base_parameters) {
         assert_eq!(online.name, offline.name);
         let sigma = online.sigma.known().expect("determined");
@@ -143,7 +142,7 @@ fn a_logged_run_replays_to_the_same_base_parameters() {
 #[test]
 fn the_paper_s_chain_of_three_joints_is_identified() {
     let leg = LegFile::load("paper-chain").expect("shipped");
-    let report = simulate::<3, 28>(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report;
+    let report = simulate(&leg, &SimulationOptions::with_seed(1)).expect("it runs").report;
     accepted_within_four_sigma(&report, "paper-chain");
 }
 

@@ -58,7 +58,7 @@ fn enabled(leg: &LegFile, seed: u64) -> Pair {
 
 /// Report of the firmware's identification of a leg.
 fn simulated(leg: &LegFile, options: &SimulationOptions) -> RunReport {
-    simulate::<JOINTS, BASE>(leg, options).expect("it runs").report
+    simulate(leg, options).expect("it runs").report
 }
 
 fn tick(pair: &mut Pair, request: Option<ControlRequest>) -> scarab::leg::ControlOutput<JOINTS> {

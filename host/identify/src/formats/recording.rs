@@ -24,7 +24,8 @@ use std::f64::consts::TAU;
 use std::io::{self, BufRead as _, Write};
 use std::path::{Path, PathBuf};
 
-use scarab_base::error::FileError;
+use scarab_base::error::{FileError, ToolError};
+use scarab_base::files::NewFile;
 
 mod chosen;
 pub(crate) mod columns;
@@ -175,6 +176,16 @@ impl Recording {
         first.check_length("")?;
         second.check_length("")?;
         Ok((first, second))
+    }
+
+    /// Writes a file in the format of [`Recording::parse`].
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), ToolError> {
+        let mut out = NewFile::create(path)?;
+        self.write(&mut out).map_err(|error| ToolError::cannot_write(path, &error))?;
+        out.finish()
     }
 
     /// Writes the format of [`Recording::parse`] with the digits that restore every number exactly.

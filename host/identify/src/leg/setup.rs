@@ -83,6 +83,30 @@ pub fn base_rank(leg: &LegFile) -> usize {
     row_model::<2, 18>(leg).map_or(0, |model| model.base.rank())
 }
 
+/// Whether a leg file can be used for a replay.
+///
+/// # Errors
+/// Names what a replay lacks.
+pub fn check_background(leg: &LegFile) -> Result<(), FileError> {
+    fn check<const N: usize, const B: usize>(leg: &LegFile) -> Result<(), FileError> {
+        background::<N, B>(leg, PriorChoice::Default, DEFAULT_SEED).map(drop)
+    }
+    with_leg_size!(leg, check(leg))
+}
+
+/// Whether a leg file can be simulated, with the firmware in control.
+///
+/// # Errors
+/// Names what a simulation lacks.
+pub fn check_simulation(leg: &LegFile) -> Result<(), FileError> {
+    fn check<const N: usize, const B: usize>(leg: &LegFile) -> Result<(), FileError> {
+        let background = background::<N, B>(leg, PriorChoice::Default, DEFAULT_SEED)?;
+        configuration(leg, &background, Plan::default(), DEFAULT_SEED)?;
+        leg.description::<N>().map(drop)
+    }
+    with_leg_size!(leg, check(leg))
+}
+
 /// Columns to be estimated according to a leg file.
 pub(crate) fn column_mask<const N: usize>(leg: &LegFile) -> ColumnMask<N> {
     core::array::from_fn(|joint| {

@@ -32,6 +32,7 @@ use crate::report::series::{Reader, Role, Series};
 use crate::report::{RunReport, Source};
 use crate::run::analysis::{Circumstances, Motion};
 use crate::run::logging_errors::encoder::Encoders;
+use crate::with_leg_size;
 use judge::{Judged, judge};
 use logging_errors::{Subject, chosen_bandwidth, encoders, noise_density};
 use predictions::write_predictions;
@@ -144,7 +145,18 @@ pub struct Replayed {
 }
 
 /// Identifies from recordings and validates on the held-out ones.
-pub fn replay<const N: usize, const B: usize>(
+///
+/// # Errors
+/// The options exclude each other, or leg and recordings do not fit.
+pub fn replay(
+    leg: &LegFile,
+    recordings: &Recordings,
+    options: &ReplayOptions,
+) -> Result<Replayed, ToolError> {
+    with_leg_size!(leg, replay_sized(leg, recordings, options))
+}
+
+fn replay_sized<const N: usize, const B: usize>(
     leg: &LegFile,
     recordings: &Recordings,
     options: &ReplayOptions,

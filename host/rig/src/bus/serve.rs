@@ -6,6 +6,7 @@ use scarab_client::alarms::Alarms;
 use scarab_client::wire::Sent;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::leg::exercise::Exercise;
+use scarab_identify::with_leg_size;
 use std::fs::File;
 use std::io::{Read, Write};
 use std::net::SocketAddr;
@@ -121,7 +122,17 @@ pub fn network<const N: usize, const B: usize>(
 }
 
 /// Serves until a termination signal.
-pub fn serve<const N: usize, const B: usize>(leg: &LegFile, options: &ServeOptions) -> Result<(), ToolError> {
+///
+/// # Errors
+/// The leg file, the flash file or the port cannot be used.
+pub fn serve(leg: &LegFile, options: &ServeOptions) -> Result<(), ToolError> {
+    with_leg_size!(leg, serve_sized(leg, options))
+}
+
+fn serve_sized<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &ServeOptions,
+) -> Result<(), ToolError> {
     let flash = options.flash.as_deref().map(|path| read(path, options.legs)).transpose()?.flatten();
     let mut wearers = wearers::<N, B>(leg, options)?;
     let mut network = network::<N, B>(leg, options, flash.as_deref(), &wearers)?;

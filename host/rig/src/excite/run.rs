@@ -17,8 +17,9 @@ use scarab_identify::leg::setup::DEFAULT_SEED;
 use scarab_identify::report::excite::{
     ComparedBase, ExciteReport, ExpectedBase, ExpectedParameter, JointReport, RandomMotion, SCHEMA,
 };
+use scarab_identify::with_leg_size;
 
-use crate::excite::assumption::with_rotors;
+use crate::excite::assumption::{Assumption, assumed, with_rotors};
 use crate::excite::bench::{Bench, ExciteOptions};
 use crate::excite::design::{Candidate, DesignOptions, Goal, SHRINK, candidates, smaller};
 use crate::excite::expectation::{Expectation, Rehearsal, rehearse};
@@ -45,11 +46,21 @@ pub struct Excited {
 }
 
 /// Rejects a motion that belongs to another leg, or exceeds the limits of angle, speed,
-/// acceleration or torque. The torque includes carried masses.
+/// acceleration or torque. The torque includes carried masses; it is not checked for a leg whose bodies are
+/// unknown.
 ///
 /// # Errors
 /// Names the file.
-pub fn check<const N: usize, const B: usize>(
+pub fn check(
+    leg: &LegFile,
+    file: &Path,
+    motion: &Excitation,
+    carried: &[Payload<f64>],
+) -> Result<(), ToolError> {
+    with_leg_size!(leg, check_sized(leg, file, motion, carried))
+}
+
+fn check_sized<const N: usize, const B: usize>(
     leg: &LegFile,
     file: &Path,
     motion: &Excitation,
@@ -57,6 +68,9 @@ pub fn check<const N: usize, const B: usize>(
 ) -> Result<(), ToolError> {
     // First, because another leg's motion is the most likely mistake.
     motion.table::<N>(leg).map_err(|reason| FileError::new(file.display(), reason))?;
+    if assumed(leg, Assumption::Best).is_err() {
+        return Ok(());
+    }
     let none = DesignOptions { duration_s: 0.0, seed: 0, evaluations: 0 };
     let options = ExciteOptions { carried: carried.to_vec(), ..ExciteOptions::plain(none, 0.0) };
     Bench::<N, B>::new(leg, &options)?
@@ -70,7 +84,11 @@ pub fn check<const N: usize, const B: usize>(
 ///
 /// # Errors
 /// The leg file cannot be used, or no motion fits.
-pub fn excite<const N: usize, const B: usize>(
+pub fn excite(leg: &LegFile, options: &ExciteOptions) -> Result<Excited, ToolError> {
+    with_leg_size!(leg, excite_sized(leg, options))
+}
+
+fn excite_sized<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ExciteOptions,
 ) -> Result<Excited, ToolError> {
@@ -159,7 +177,11 @@ fn excited<const N: usize, const B: usize>(
 ///
 /// # Errors
 /// The leg file cannot be used, or names the limit that no motion keeps.
-pub fn designable<const N: usize, const B: usize>(leg: &LegFile) -> Result<Vec<String>, ToolError> {
+pub fn designable(leg: &LegFile) -> Result<Vec<String>, ToolError> {
+    with_leg_size!(leg, designable_sized(leg))
+}
+
+fn designable_sized<const N: usize, const B: usize>(leg: &LegFile) -> Result<Vec<String>, ToolError> {
     first_fitting::<N, B, _>(leg, true, designed_shortly::<N, B>).map(|((), lines)| lines)
 }
 

@@ -8,7 +8,7 @@ use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::with_leg_size;
 
-use crate::identify::write_log;
+use crate::identify::recorded;
 use crate::trace::read::Trace;
 use crate::trace::records::Log;
 
@@ -95,5 +95,5 @@ fn write_sized<const N: usize, const B: usize>(
             segment: Some(Segment::Training),
         })
         .collect();
-    write_log(path, leg, &logged)
+    recorded(path, leg, &logged).save(path)
 }

@@ -6,7 +6,6 @@ use scarab_base::{files, output};
 use scarab_identify::formats::excitation::Excitation;
 use scarab_identify::formats::motion_samples::{MotionSamples, SampleRate};
 use scarab_identify::leg::setup::DEFAULT_SEED;
-use scarab_identify::with_leg_size;
 use scarab_rig::excite::assumption::Assumption;
 use scarab_rig::excite::bench::{ExciteOptions, FEWEST_EVALUATIONS, MOST_EVALUATIONS};
 use scarab_rig::excite::design::DesignOptions;
@@ -88,7 +87,7 @@ pub(crate) fn run(arguments: &ExciteArguments) -> Result<u8, ToolError> {
         assumption: if arguments.assume_truth { Assumption::Truth } else { Assumption::Best },
     };
     options.check().map_err(ToolError::input)?;
-    let excited = with_leg_size!(leg, excite(leg, options))?;
+    let excited = excite(leg, options)?;
     if let Some(path) = &arguments.out {
         files::write(path, excited.motion.to_toml())?;
     }

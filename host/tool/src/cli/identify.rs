@@ -10,7 +10,6 @@ use scarab_identify::formats::shard::{Argument, CampaignHeader, ShardResults};
 use scarab_identify::leg::placed_mass::PlacedMass;
 use scarab_identify::leg::setup::DEFAULT_SEED;
 use scarab_identify::report::{RunReport, RunsReport, SCHEMA};
-use scarab_identify::with_leg_size;
 use scarab_rig::excite::run::check;
 use scarab_rig::identify::{identify_many, identify_one};
 use scarab_rig::options::{DriveModel, SimulationOptions};
@@ -108,10 +107,10 @@ pub(crate) fn run(arguments: &IdentifyArguments, stated: Vec<Argument>) -> Resul
     if let (Some(motion), Some(file)) = (&excitation, &arguments.excitation) {
         // Checked without and with the mass of the second run.
         let carried: &Vec<_> = &load.into_iter().collect();
-        with_leg_size!(leg, check(leg, file, motion, carried))?;
+        check(leg, file, motion, carried)?;
         if let Some(payload) = payload {
             let carried = &load.into_iter().chain([payload]).collect::<Vec<_>>();
-            with_leg_size!(leg, check(leg, file, motion, carried))?;
+            check(leg, file, motion, carried)?;
         }
     }
     let options = |seed: u64| SimulationOptions {
@@ -137,7 +136,7 @@ pub(crate) fn run(arguments: &IdentifyArguments, stated: Vec<Argument>) -> Resul
     let shard = arguments.shard.unwrap_or(Shard::WHOLE);
     let seeds: Vec<u64> = (first..=last).collect();
     let options: &Vec<_> = &shard.part(&seeds).iter().copied().map(options).collect();
-    let runs = with_leg_size!(leg, identify_many(leg, options))?;
+    let runs = identify_many(leg, options)?;
     let part = ShardResults::new(shard, SeedRuns { runs });
     if let (Some(_), Some(path)) = (arguments.shard, &arguments.common.json) {
         return part.write(path, &campaign, &format!("{} of {} runs", options.len(), seeds.len()));
@@ -153,7 +152,7 @@ fn run_once(
 ) -> Result<u8, ToolError> {
     let log = arguments.log.as_deref();
     let kept = arguments.model.kept(leg)?;
-    let (mut run, series) = with_leg_size!(leg, identify_one(leg, options, log))?;
+    let (mut run, series) = identify_one(leg, options, log)?;
     arguments.model.compare(kept.as_ref(), &mut run);
     let code = finish(leg, &run, &arguments.common, "")?;
     draw(leg, &arguments.common, &run, &series, &[])?;

@@ -7,7 +7,6 @@ use scarab_identify::formats::leg_file::{LegFile, PushesFile};
 use scarab_identify::leg::placed_mass::PlacedMass;
 use scarab_identify::leg::setup::DEFAULT_SEED;
 use scarab_identify::report::SCHEMA;
-use scarab_identify::with_leg_size;
 use scarab_rig::monitor::{Disturbance, MonitorOptions, watch};
 use scarab_rig::report::monitor::{MonitorRun, MonitorRuns};
 
@@ -119,10 +118,8 @@ pub(crate) fn run(arguments: &MonitorArguments) -> Result<u8, ToolError> {
     let options: Vec<_> = (first..=last)
         .map(|seed| MonitorOptions { seed, disturbances: disturbances.clone(), at_s, hours, pushes })
         .collect();
-    let runs: Vec<MonitorRun> = options
-        .par_iter()
-        .map(|options| with_leg_size!(leg, watch(leg, options)))
-        .collect::<Result<_, _>>()?;
+    let runs: Vec<MonitorRun> =
+        options.par_iter().map(|options| watch(leg, options)).collect::<Result<_, _>>()?;
     let runs = MonitorRuns { schema: SCHEMA, leg: leg.name.clone(), runs };
     if let Some(path) = &arguments.json {
         write_json(path, &runs)?;

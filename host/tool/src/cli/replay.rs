@@ -10,7 +10,6 @@ use scarab_identify::formats::recording::{Read, Recording};
 use scarab_identify::leg::placed_mass::PlacedMass;
 use scarab_identify::leg::setup::DEFAULT_SEED;
 use scarab_identify::run::replay::{Recordings, ReplayOptions, replay};
-use scarab_identify::with_leg_size;
 
 use crate::cli::arguments::{Input, Output};
 use crate::cli::common::{Common, draw, finish};
@@ -126,7 +125,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         held_out: read(&arguments.validate, import)?,
         with_payload: read(&arguments.with_payload, import)?,
     };
-    let mut replayed = with_leg_size!(leg, replay(leg, recordings, options))?;
+    let mut replayed = replay(leg, recordings, options)?;
     replayed.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     arguments.model.compare(kept.as_ref(), &mut replayed.run);
     let mut sources = format!("{}{}\n\n", tables::sources(&replayed.sources).to_text(), tables::SOURCES);

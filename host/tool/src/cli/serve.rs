@@ -7,7 +7,6 @@ use clap::Args;
 use scarab_base::error::{EXIT_ACCEPTED, ToolError};
 use scarab_identify::leg::exercise::Exercise;
 use scarab_identify::leg::setup::DEFAULT_SEED;
-use scarab_identify::with_leg_size;
 use scarab_rig::bus::serve::{Beginning, ServeOptions, serve};
 use scarab_rig::worn::CADENCE_HZ;
 
@@ -93,7 +92,6 @@ pub(crate) fn run(arguments: &ServeArguments) -> Result<u8, ToolError> {
         },
         wearer: arguments.motion,
     };
-    let (leg, options) = (&leg, &options);
-    with_leg_size!(leg, serve(leg, options))?;
+    serve(&leg, &options)?;
     Ok(EXIT_ACCEPTED)
 }

@@ -39,7 +39,7 @@ pub(crate) fn play<const N: usize, const B: usize>(
 ) -> Result<RunReport, ToolError> {
     let none = || ToolError::input("no recording to be played");
     let recording = recordings.training.first().ok_or_else(none)?.recording.clone();
-    let replayed = replay::<N, B>(leg, recordings, options)?;
+    let replayed = replay(leg, recordings, options)?;
     replayed.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     let report = replayed.run;
     let mut background = background::<N, B>(leg, options.prior, options.swarm_seed)?;

@@ -15,7 +15,7 @@ use scarab::model::Payload;
 fn identified() -> (RunReport, Series) {
     let leg = LegFile::load("x2-wearer-75kg").expect("shipped");
     let options = SimulationOptions { with_series: true, ..SimulationOptions::with_seed(1) };
-    identify_one::<2, 13>(&leg, &options, None).expect("it runs")
+    identify_one(&leg, &options, None).expect("it runs")
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn torques_corrected_by_a_known_mass_are_drawn_corrected() {
         payload: Some(Payload { joint: 1, mass: 5.0, position: [0.2, 0.0, 0.0].into() }),
         ..SimulationOptions::with_seed(1)
     };
-    let (report, series) = identify_one::<2, 13>(&leg, &options, None).expect("it runs");
+    let (report, series) = identify_one(&leg, &options, None).expect("it runs");
     for motion in &series.motions {
         let fits = if motion.role == Role::Training { &report.training } else { &report.validation };
         let name = if motion.role == Role::Training { "fourier" } else { motion.name.as_str() };

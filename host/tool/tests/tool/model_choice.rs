@@ -12,7 +12,7 @@ use serde_json::Value;
 
 fn runs(leg: &LegFile, seeds: std::ops::RangeInclusive<u64>) -> Vec<RunReport> {
     let options: Vec<_> = seeds.map(SimulationOptions::with_seed).collect();
-    identify_many::<2, 13>(leg, &options).expect("it runs")
+    identify_many(leg, &options).expect("it runs")
 }
 
 /// Default leg without offsets and without a rotor in the knee; the data choose both. Prior and servo match:

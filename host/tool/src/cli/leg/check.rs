@@ -2,16 +2,14 @@
 
 use std::fmt::Write;
 
-use scarab::ident::Plan;
 
 use scarab::model::planar::JOINTS;
 use scarab_base::error::{FileError, ToolError};
 use scarab_identify::formats::leg_file::draft::truth_text;
 use scarab_identify::formats::leg_file::keys::{KeyLine, PRIOR, TRUTH};
 use scarab_identify::formats::leg_file::{JointFile, LegFile, MissingForImage};
-use scarab_identify::leg::setup::{DEFAULT_SEED, PriorChoice, background, configuration};
+use scarab_identify::leg::setup::{DEFAULT_SEED, check_background, check_simulation};
 use scarab_identify::run::replay::warnings::rounded_twists;
-use scarab_identify::with_leg_size;
 use scarab_rig::excite::run::designable;
 use scarab_rig::image::leg_source::describe;
 
@@ -26,7 +24,7 @@ pub fn text(name_or_path: &str) -> Result<String, ToolError> {
     for remark in rounded_twists(&leg) {
         let _ = writeln!(text, "{remark}");
     }
-    let known = with_leg_size!(&leg, replayable(&leg));
+    let known = check_background(&leg);
     replay(&mut text, &leg, &known);
     simulation(&mut text, &leg, &known);
     excite(&mut text, &leg, &known);
@@ -37,18 +35,6 @@ pub fn text(name_or_path: &str) -> Result<String, ToolError> {
         );
     }
     Ok(text)
-}
-
-/// Analyses the leg as `replay` does.
-fn replayable<const N: usize, const B: usize>(leg: &LegFile) -> Result<(), FileError> {
-    background::<N, B>(leg, PriorChoice::Default, DEFAULT_SEED).map(drop)
-}
-
-/// Configures firmware and plant as a simulation does.
-fn simulated<const N: usize, const B: usize>(leg: &LegFile) -> Result<(), FileError> {
-    let background = background::<N, B>(leg, PriorChoice::Default, DEFAULT_SEED)?;
-    configuration(leg, &background, Plan::default(), DEFAULT_SEED)?;
-    leg.description::<N>().map(drop)
 }
 
 // Formatting into a String cannot fail.
@@ -82,7 +68,7 @@ fn simulation(text: &mut String, leg: &LegFile, known: &Result<(), FileError>) {
     let without: Vec<usize> =
         (0..leg.joints.len()).filter(|joint| leg.joints[*joint].truth.is_none()).collect();
     if without.is_empty() {
-        return match with_leg_size!(leg, simulated(leg)) {
+        return match check_simulation(leg) {
             Ok(()) => {
                 section(text, "simulation", "ready");
                 let is_noiseless = leg.joints.iter().all(|joint| joint.current_noise_a == 0.0);
@@ -122,7 +108,7 @@ fn excite(text: &mut String, leg: &LegFile, known: &Result<(), FileError>) {
         let without = (0..leg.joints.len()).filter(|joint| leg.joints[*joint].prior.is_none());
         return without.for_each(|joint| of_joint(text, leg, joint, &[line(&PRIOR)]));
     }
-    match with_leg_size!(leg, designable(leg)) {
+    match designable(leg) {
         Ok(assumed) => {
             section(text, "excite", "ready");
             if !noise {

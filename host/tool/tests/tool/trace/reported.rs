@@ -76,7 +76,7 @@ fn compare(path: &str, reported: &Value, own: &Value, compared: &mut usize) {
 #[test]
 fn the_report_of_a_trace_equals_that_of_its_run() {
     let leg = default_leg();
-    let own = simulate::<2, 13>(&leg, &SimulationOptions::with_seed(1)).expect("simulated").report;
+    let own = simulate(&leg, &SimulationOptions::with_seed(1)).expect("simulated").report;
     let reported = run_report(&read(accepted()), &leg).expect("a complete result");
     let json = |run| serde_json::to_value(run).expect("JSON");
     let mut compared = 0;
@@ -190,7 +190,7 @@ fn the_documented_kinds_and_keys_are_exactly_those_of_the_code() {
 fn the_curves_of_a_trace_are_those_of_the_run() {
     let leg = default_leg();
     let options = SimulationOptions { with_series: true, ..SimulationOptions::with_seed(1) };
-    let own = simulate::<2, 13>(&leg, &options).expect("simulated").series;
+    let own = simulate(&leg, &options).expect("simulated").series;
     let reported = curves(&read(accepted()), &leg).expect("a trace of this leg");
     assert_eq!((reported.motions.len(), &reported.white_correlation), (4, &own.white_correlation));
     for (reported, own) in reported.motions.iter().zip(&own.motions) {
