@@ -7,7 +7,7 @@
 //! | [`bus`] | boards on a simulated bus, also behind a port |
 //! | [`parameter_file`] | stored data of a board |
 //! | [`trace`], [`traced`] | records of a trace; the run that they tell of |
-//! | [`simulate`], [`identify`], [`identified`], [`watch`], [`scale`] | a simulated leg is identified |
+//! | [`simulate`], [`run_state`], [`identify`], [`identified`], [`watch`], [`scale`] | a simulated leg is identified |
 //! | [`excite`], [`shaking`] | design of an exciting motion |
 //! | [`monitor`], [`assist`], [`motor`] | a watched model, an assisted wearer, a motor stand |
 //! | [`report`] | results of assistance, monitor and motor stand |
@@ -37,6 +37,7 @@ pub mod pair;
 pub mod parameter_file;
 pub mod perturb;
 pub mod report;
+pub mod run_state;
 pub mod scale;
 pub mod shaking;
 pub mod simulate;

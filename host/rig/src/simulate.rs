@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use hal_sim::world::TICK_S;
-use scarab::leg::{Activity, ControlOutput, ControlRequest, IdentifyPhase, LoggedSample, Segment, Step};
+use scarab::leg::{Activity, ControlRequest, IdentifyPhase, LegConfiguration, LoggedSample, Segment, Step};
 use scarab::motion::Periodic;
 use scarab::real::sqrt;
 use scarab_base::error::ToolError;
@@ -12,11 +12,13 @@ use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::formats::recording::Recording;
 use scarab_identify::report::series::Series;
 use scarab_identify::report::{RunReport, TrackingReport};
+use scarab_identify::run::progress::{self, Progress};
 use scarab_identify::with_leg_size;
 
 use crate::identify::recorded;
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
+use crate::run_state::{RunState, Tick};
 use crate::shaking::Shaking;
 use crate::watch::Watch;
 use crate::{perturb, scale};
@@ -36,17 +38,17 @@ pub struct SimulatedRun {
 }
 
 /// Sees a run while it is simulated.
-pub trait Observer<const N: usize, const B: usize> {
-    /// Begins a run.
-    fn begin(&mut self, context: &Context<N, B>);
+pub trait Observer {
+    /// Begins a run; `progress` estimates from its samples.
+    fn begin(&mut self, progress: Box<dyn Progress>);
     /// Sees the tick just run.
-    fn tick(&mut self, pair: &Pair<N, B>, output: &ControlOutput<N>);
+    fn tick(&mut self, run: &dyn RunState);
 }
 
 /// Sees nothing.
-impl<const N: usize, const B: usize> Observer<N, B> for () {
-    fn begin(&mut self, _: &Context<N, B>) {}
-    fn tick(&mut self, _: &Pair<N, B>, _: &ControlOutput<N>) {}
+impl Observer for () {
+    fn begin(&mut self, _: Box<dyn Progress>) {}
+    fn tick(&mut self, _: &dyn RunState) {}
 }
 
 /// Drives, identifies, validates and tracks one simulated leg.
@@ -54,28 +56,33 @@ impl<const N: usize, const B: usize> Observer<N, B> for () {
 /// # Errors
 /// The leg file cannot be used, or a perturbation does not fit.
 pub fn simulate(leg: &LegFile, options: &SimulationOptions) -> Result<SimulatedRun, ToolError> {
-    with_leg_size!(leg, simulate_sized(leg, options))
-}
-
-fn simulate_sized<const N: usize, const B: usize>(
-    leg: &LegFile,
-    options: &SimulationOptions,
-) -> Result<SimulatedRun, ToolError> {
-    simulate_observed::<N, B>(leg, options, &mut ())
+    simulate_observed(leg, options, &mut ())
 }
 
 /// [`simulate`] with an observer, which sees all but the tracking after the verdict.
-pub fn simulate_observed<const N: usize, const B: usize>(
+///
+/// # Errors
+/// Those of [`simulate`].
+pub fn simulate_observed(
     leg: &LegFile,
     options: &SimulationOptions,
-    observer: &mut impl Observer<N, B>,
+    observer: &mut dyn Observer,
+) -> Result<SimulatedRun, ToolError> {
+    with_leg_size!(leg, simulate_observed_sized(leg, options, observer))
+}
+
+fn simulate_observed_sized<const N: usize, const B: usize>(
+    leg: &LegFile,
+    options: &SimulationOptions,
+    observer: &mut dyn Observer,
 ) -> Result<SimulatedRun, ToolError> {
     let started = Instant::now();
     let wrong = options.perturbations.as_slice();
     let simulated = perturb::simulated(leg, wrong)?;
     let mut context = Context::<N, B>::new(&perturb::believed(leg, wrong)?, options)?;
     perturb::configure(&mut context, wrong)?;
-    observer.begin(&context);
+    let LegConfiguration { bandwidth_hz, estimator, plan, .. } = context.configuration;
+    observer.begin(progress::of_background(context.background.clone(), bandwidth_hz, estimator, plan)?);
     let Driven { pair, mut watch, stopped, shaking } = drive(leg, &simulated, &context, options, observer)?;
     let (mut report, series) = if stopped.is_some() {
         watch.report(&pair, options, Vec::new(), stopped, started)?
@@ -117,7 +124,7 @@ pub fn drive<'a, const N: usize, const B: usize>(
     simulated: &LegFile,
     context: &'a Context<N, B>,
     options: &SimulationOptions,
-    observer: &mut impl Observer<N, B>,
+    observer: &mut dyn Observer,
 ) -> Result<Driven<'a, N, B>, ToolError> {
     let wrong = options.perturbations.as_slice();
     let mut pair = Pair::new(simulated, context, options.seed)?;
@@ -140,7 +147,7 @@ pub fn drive<'a, const N: usize, const B: usize>(
         let output = pair.tick(request.take(), context.gravity);
         watch.see(&pair, &torque, &sticking, output.logged.as_ref());
         shaking.take(&pair.world, &output.motion);
-        observer.tick(&pair, &output);
+        observer.tick(&Tick { context, pair: &pair, output: &output });
         let activity = pair.leg.control().activity();
         if activity != before {
             match activity {

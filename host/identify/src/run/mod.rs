@@ -9,6 +9,7 @@ pub mod information;
 pub(crate) mod logging_errors;
 pub mod model_choice;
 pub mod predict;
+pub mod progress;
 pub mod regressor;
 pub mod replay;
 pub mod resample;

@@ -37,7 +37,8 @@ use judge::{Judged, judge};
 use logging_errors::{Subject, chosen_bandwidth, encoders, noise_density};
 use predictions::write_predictions;
 use read::{Parts, parts};
-use rows::{PENDING, Samples, TAPS, bandwidth_error, new_recorder};
+pub(crate) use rows::{PENDING, TAPS};
+use rows::{Samples, bandwidth_error, new_recorder};
 use solve::{Solved, solve};
 
 /// Lowest bandwidth, tenths of a Hz.

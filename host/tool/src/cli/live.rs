@@ -19,7 +19,6 @@ use scarab_identify::formats::recording::Recording;
 use scarab_identify::leg::matching::refuse_another_leg;
 use scarab_identify::leg::setup::DEFAULT_SEED;
 use scarab_identify::run::replay::{Recordings, ReplayOptions};
-use scarab_identify::with_leg_size;
 use scarab_rig::options::{DriveModel, SimulationOptions};
 use scarab_rig::perturb::Perturbation;
 use scarab_rig::traced::run::{StreamReader, decoder};
@@ -267,15 +266,15 @@ pub(crate) fn run(arguments: &LiveArguments) -> Result<u8, ToolError> {
 fn report(leg: &LegFile, source: Source, hub: &Hub) -> Result<(u8, String), ToolError> {
     let out = &|update: LiveUpdate| hub.push(update);
     let report = match source {
-        Source::Simulated(options, live) => Some(with_leg_size!(leg, identify(leg, &options, &live, out))?),
+        Source::Simulated(options, live) => Some(identify(leg, &options, &live, out)?),
         Source::Recording(recorded, speed) => {
             let (recordings, options) = &*recorded;
-            Some(with_leg_size!(leg, play(leg, recordings, options, speed, out))?)
+            Some(play(leg, recordings, options, speed, out)?)
         }
-        Source::Trace(input) => with_leg_size!(leg, follow(leg, *input, out))?,
+        Source::Trace(input) => follow(leg, *input, out)?,
         Source::Bus(input) => {
             let code = if input.lines == Lines::Slcan { EXIT_INPUT } else { EXIT_ACCEPTED };
-            return Ok((code, with_leg_size!(leg, watch(leg, *input, out))?));
+            return Ok((code, watch(leg, *input, out)?));
         }
     };
     let Some(report) = report else { return Ok((EXIT_INPUT, "the trace has no complete result".into())) };

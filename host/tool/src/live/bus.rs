@@ -208,12 +208,12 @@ impl Load {
 }
 
 /// Describes the bus and its legs; returns these, each with the beginning of its lines in the timeline.
-fn legs<'a, const N: usize, const B: usize>(
+fn legs<'a>(
     leg: &'a LegFile,
     source: &BusInput,
     out: &'a dyn Fn(LiveUpdate),
-) -> Result<Vec<(String, Leg<'a, N, B>)>, ToolError> {
-    let ids: Vec<[u8; N]> = source.nodes.chunks_exact(N).filter_map(|ids| ids.try_into().ok()).collect();
+) -> Result<Vec<(String, Leg<'a>)>, ToolError> {
+    let ids: Vec<&[u8]> = source.nodes.chunks_exact(leg.joints.len()).collect();
     let shown = if source.lines == Lines::Candump {
         Path::new(&source.name).file_name().unwrap_or_default()
     } else {
@@ -227,7 +227,7 @@ fn legs<'a, const N: usize, const B: usize>(
     let mut legs = Vec::new();
     for (index, own) in ids.iter().enumerate() {
         let prefix = if ids.len() > 1 { format!("leg {}: ", index + 1) } else { String::new() };
-        legs.push((prefix, Leg::new(leg, *own, index, source.model.as_ref(), out)?));
+        legs.push((prefix, Leg::new(leg, own, index, source.model.as_ref(), out)?));
     }
     Ok(legs)
 }
@@ -236,12 +236,8 @@ fn legs<'a, const N: usize, const B: usize>(
 ///
 /// # Errors
 /// The input has no frame, or the leg file does not fit.
-pub(crate) fn watch<const N: usize, const B: usize>(
-    leg: &LegFile,
-    source: BusInput,
-    out: &dyn Fn(LiveUpdate),
-) -> Result<String, ToolError> {
-    let mut legs = legs::<N, B>(leg, &source, out)?;
+pub(crate) fn watch(leg: &LegFile, source: BusInput, out: &dyn Fn(LiveUpdate)) -> Result<String, ToolError> {
+    let mut legs = legs(leg, &source, out)?;
     let BusInput { input, lines, name, bits_per_s, speed, .. } = source;
     let note = |time_s: f64, weight, words: String| out(LiveUpdate::Note(LiveNote { time_s, weight, words }));
     let mut load = Load { bits_per_s, ..Load::default() };

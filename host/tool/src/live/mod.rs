@@ -2,7 +2,7 @@
 //!
 //! | part | content |
 //! | --- | --- |
-//! | `clock`, `picture`, `progress` | pace; samples, rows and estimates from logged samples |
+//! | `clock`, `picture` | pace; samples, rows and estimates from logged samples |
 //! | `simulated` | a simulated leg that identifies itself |
 //! | `playback` | a recording, played back |
 //! | `bus` | legs on a CANopen bus, from the frames of a silent listener |
@@ -12,7 +12,6 @@ pub(crate) mod bus;
 pub(crate) mod clock;
 pub(crate) mod picture;
 pub(crate) mod playback;
-pub(crate) mod progress;
 pub mod report;
 pub(crate) mod simulated;
 pub(crate) mod traced;

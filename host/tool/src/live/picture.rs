@@ -1,15 +1,14 @@
 //! Reports of one leg from its logged samples: means, filtered torque with its prediction, estimates.
 
-use scarab::ident::Plan;
-use scarab::leg::LoggedSample;
 use scarab::model::AnatomicalJoint;
 use scarab::servo::{LOG_RATE_HZ, SERVO_RATE_HZ, TICKS_PER_LOG};
+use scarab_base::error::ToolError;
+use scarab_identify::formats::leg_file::geometry::anatomical_joints;
 use scarab_identify::formats::leg_file::{JointFile, LegFile};
-use scarab_identify::leg::background::Background;
 use scarab_identify::leg::stick::Stick;
 use scarab_identify::report::{BaseReport, RunReport};
+use scarab_identify::run::progress::{LoggedMotion, PredictedRow, Progress};
 
-use crate::live::progress::{PredictedRow, Progress};
 use crate::live::report::{
     EstimateOrigin, JointScene, LegScene, LiveEstimate, LiveNote, LiveOutcome, LiveParameter, LiveRow,
     LiveSample, LiveUpdate, RATE_HZ, Scene, Severity,
@@ -31,26 +30,29 @@ pub(crate) fn scene(leg: &LegFile, source: String, speed: f64) -> Scene {
 }
 
 /// Sums over one period of the picture, in the model's angles and signs.
-#[derive(Clone, Copy)]
-struct Sums<const N: usize> {
-    angle: [f64; N],
-    torque: [f64; N],
+#[derive(Clone)]
+struct Sums {
+    angle: Vec<f64>,
+    torque: Vec<f64>,
     logged: u32,
-    commanded: [f64; N],
+    commanded: Vec<f64>,
     ticks: u32,
 }
 
-impl<const N: usize> Sums<N> {
-    const EMPTY: Self = Self { angle: [0.0; N], torque: [0.0; N], logged: 0, commanded: [0.0; N], ticks: 0 };
+impl Sums {
+    fn empty(joints: usize) -> Self {
+        let zeros = vec![0.0; joints];
+        Self { angle: zeros.clone(), torque: zeros.clone(), logged: 0, commanded: zeros, ticks: 0 }
+    }
 }
 
 /// Reports about one leg.
-pub(crate) struct Picture<'a, const N: usize> {
+pub(crate) struct Picture<'a> {
     leg: &'a LegFile,
     out: &'a dyn Fn(LiveUpdate),
     stick: Stick,
-    anatomy: [AnatomicalJoint<f64>; N],
-    sums: Sums<N>,
+    anatomy: Vec<AnatomicalJoint<f64>>,
+    sums: Sums,
     /// Whether torques come from currents by the leg's torque constants.
     has_currents: bool,
     /// Index of the leg in the scene.
@@ -59,11 +61,20 @@ pub(crate) struct Picture<'a, const N: usize> {
     pub(crate) time_s: f64,
 }
 
-impl<'a, const N: usize> Picture<'a, N> {
+impl<'a> Picture<'a> {
     /// Creates the reports of a leg, at time zero.
-    pub fn new(leg: &'a LegFile, anatomy: [AnatomicalJoint<f64>; N], out: &'a dyn Fn(LiveUpdate)) -> Self {
-        let stick = Stick::from_leg(leg);
-        Self { leg, out, stick, anatomy, sums: Sums::EMPTY, has_currents: true, leg_index: 0, time_s: 0.0 }
+    ///
+    /// # Errors
+    /// The leg file's directions or zeros cannot be used.
+    pub fn new(leg: &'a LegFile, out: &'a dyn Fn(LiveUpdate)) -> Result<Self, ToolError> {
+        let (stick, anatomy) = (Stick::from_leg(leg), anatomical_joints(leg)?);
+        let sums = Sums::empty(anatomy.len());
+        Ok(Self { leg, out, stick, anatomy, sums, has_currents: true, leg_index: 0, time_s: 0.0 })
+    }
+
+    /// Conversion of each joint between anatomical and chain angles.
+    pub(crate) fn anatomy(&self) -> &[AnatomicalJoint<f64>] {
+        &self.anatomy
     }
 
     /// Reports currents as unknown.
@@ -88,7 +99,7 @@ impl<'a, const N: usize> Picture<'a, N> {
 
     /// Begins a period.
     pub(crate) fn restart(&mut self) {
-        self.sums = Sums::EMPTY;
+        self.sums = Sums::empty(self.anatomy.len());
     }
 
     /// Hands on a report.
@@ -103,7 +114,7 @@ impl<'a, const N: usize> Picture<'a, N> {
     }
 
     /// Takes the commanded angles of one servo tick, D-H, rad.
-    pub(crate) fn command(&mut self, position_rad: &[f32; N]) {
+    pub(crate) fn command(&mut self, position_rad: &[f32]) {
         self.sums.ticks += 1;
         for (sum, angle) in self.sums.commanded.iter_mut().zip(position_rad) {
             *sum += f64::from(*angle);
@@ -113,75 +124,68 @@ impl<'a, const N: usize> Picture<'a, N> {
     /// Adds a logged sample to the means and to the progress of the identification. In the motion to identify
     /// from, least squares over the motion so far are reported each second. A torque that is not a number is
     /// unknown.
-    pub(crate) fn learn<const B: usize>(
-        &mut self,
-        logged: &LoggedSample<N>,
-        progress: &mut Progress<N, B>,
-        background: &Background<N, B>,
-        plan: Plan,
-    ) {
+    pub(crate) fn learn(&mut self, logged: &LoggedMotion, progress: &mut dyn Progress) {
         self.log(logged);
-        if !logged.sample.torque_nm.iter().all(|torque| torque.is_finite()) {
+        if !logged.torque_nm.iter().all(|torque| torque.is_finite()) {
             progress.break_off();
             return;
         }
         let Some(row) = progress.push(logged) else { return };
         self.row(&row);
-        if progress.is_due() {
-            let estimate = progress.estimate(plan, background.model.base.rank());
-            let base = background.base_parameters(&[false; B], &estimate, None);
+        if let Some(base) = progress.estimate() {
             self.estimate(EstimateOrigin::Motion, 0, &base);
         }
     }
 
     /// Adds a logged sample to the means; the last one of a period ends it.
-    fn log(&mut self, logged: &LoggedSample<N>) {
+    fn log(&mut self, logged: &LoggedMotion) {
         let sums = &mut self.sums;
         sums.logged += 1;
-        for joint in 0..N {
-            sums.angle[joint] += f64::from(logged.sample.position_rad[joint]);
-            sums.torque[joint] += f64::from(logged.sample.torque_nm[joint]);
+        for joint in 0..self.anatomy.len() {
+            sums.angle[joint] += f64::from(logged.position_rad[joint]);
+            sums.torque[joint] += f64::from(logged.torque_nm[joint]);
         }
         if sums.logged < SAMPLES {
             return;
         }
-        let sums = core::mem::replace(&mut self.sums, Sums::EMPTY);
-        let angles = sums.angle.map(|sum| sum / f64::from(SAMPLES));
+        let joints = self.anatomy.len();
+        let sums = core::mem::replace(&mut self.sums, Sums::empty(joints));
+        let angles: Vec<f64> = sums.angle.iter().map(|sum| sum / f64::from(SAMPLES)).collect();
         let anatomical = |joint: usize, angle: f64| self.anatomy[joint].angle_from_chain(angle) as f32;
-        let torque: [Option<f64>; N] = core::array::from_fn(|joint| {
+        let torque = |joint: usize| {
             let torque = self.anatomy[joint].from_chain(sums.torque[joint] / f64::from(SAMPLES));
             Some(torque).filter(|torque| torque.is_finite())
-        });
+        };
         let commanded = |joint: usize| {
             (sums.ticks > 0).then(|| anatomical(joint, sums.commanded[joint] / f64::from(sums.ticks)))
         };
         let current = |joint: usize| {
-            let torque = torque[joint].filter(|_| self.has_currents)?;
+            let torque = torque(joint).filter(|_| self.has_currents)?;
             Some((torque / self.leg.joints[joint].torque_per_ampere) as f32)
         };
         let sample = LiveSample {
             leg: self.leg_index,
             time_s: rounded(self.time_s - HALF_PERIOD_S),
-            angle_rad: (0..N).map(|joint| anatomical(joint, angles[joint])).collect(),
-            commanded_rad: (0..N).map(commanded).collect(),
-            torque_nm: torque.iter().map(|torque| torque.map(|torque| torque as f32)).collect(),
-            current_a: (0..N).map(current).collect(),
+            angle_rad: (0..joints).map(|joint| anatomical(joint, angles[joint])).collect(),
+            commanded_rad: (0..joints).map(commanded).collect(),
+            torque_nm: (0..joints).map(|joint| torque(joint).map(|torque| torque as f32)).collect(),
+            current_a: (0..joints).map(current).collect(),
             points_m: self.stick.points(&angles),
         };
         self.send(LiveUpdate::Sample(sample));
     }
 
     /// Reports a row.
-    fn row(&mut self, row: &PredictedRow<N>) {
-        let signed = |(joint, torque): (usize, &Option<f32>)| {
-            torque.map(|torque| self.anatomy[joint].from_chain(f64::from(torque)) as f32)
-        };
-        let measured = row.measured.map(Some);
+    fn row(&mut self, row: &PredictedRow) {
+        let signed = |joint: usize, torque: f32| self.anatomy[joint].from_chain(f64::from(torque)) as f32;
+        let (measured, predicted) = (row.measured.iter().enumerate(), row.predicted.iter().enumerate());
         let row = LiveRow {
             leg: self.leg_index,
             time_s: rounded(self.time_s - HALF_SAMPLE_S - row.age_s),
-            measured_nm: measured.iter().enumerate().filter_map(signed).collect(),
-            predicted_nm: row.predicted.iter().enumerate().map(signed).collect(),
+            measured_nm: measured.map(|(joint, torque)| signed(joint, *torque)).collect(),
+            predicted_nm: predicted
+                .map(|(joint, torque)| torque.map(|torque| signed(joint, torque)))
+                .collect(),
         };
         self.send(LiveUpdate::Row(row));
     }

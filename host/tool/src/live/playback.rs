@@ -4,23 +4,19 @@
 //! that bad input is refused at once. Estimates and predictions of the part to identify from are those of the
 //! samples played so far; those of the held-out part use the result.
 
-use scarab::ident::{Plan, SAMPLE_RATE_HZ};
-use scarab::leg::{LoggedSample, Segment};
-use scarab::model::AnatomicalJoint;
-use scarab::servo::{LogSample, SERVO_RATE_HZ, TICKS_PER_LOG};
+use scarab::ident::SAMPLE_RATE_HZ;
+use scarab::leg::Segment;
+use scarab::servo::SERVO_RATE_HZ;
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
-use scarab_identify::formats::leg_file::geometry::anatomy;
 use scarab_identify::formats::recording::Recording;
-use scarab_identify::leg::background::Background;
-use scarab_identify::leg::setup::background;
 use scarab_identify::report::RunReport;
+use scarab_identify::run::progress::{LoggedMotion, Progress, ProgressOptions, progress};
 use scarab_identify::run::replay::{Recordings, ReplayOptions, replay};
 use scarab_identify::run::resample::Resampled;
 
 use crate::live::clock::Clock;
 use crate::live::picture::{HALF_SAMPLE_S, Picture, scene};
-use crate::live::progress::Progress;
 use crate::live::report::{EstimateOrigin, LiveStatus, LiveUpdate, RATE_HZ, Severity};
 
 /// Samples between two looks at the clock.
@@ -30,7 +26,7 @@ const SAMPLES_PER_LOOK: usize = (SAMPLE_RATE_HZ as u32 / RATE_HZ) as usize;
 ///
 /// # Errors
 /// Those of `replay`.
-pub(crate) fn play<const N: usize, const B: usize>(
+pub(crate) fn play(
     leg: &LegFile,
     recordings: &Recordings,
     options: &ReplayOptions,
@@ -42,16 +38,21 @@ pub(crate) fn play<const N: usize, const B: usize>(
     let replayed = replay(leg, recordings, options)?;
     replayed.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     let report = replayed.run;
-    let mut background = background::<N, B>(leg, options.prior, options.swarm_seed)?;
-    background.use_estimator(options.estimator);
-    let progress = Progress::new(&background.device, options.bandwidth_hz as f32, options.estimator)?;
+    let progress = progress(
+        leg,
+        &ProgressOptions {
+            prior: (options.prior, options.swarm_seed),
+            bandwidth_hz: options.bandwidth_hz,
+            estimator: options.estimator,
+            plan: options.plan,
+            knows_truth: true,
+        },
+    )?;
     let name = recording.file.file_name().unwrap_or_default().display();
     let source = format!("recording {name}, {:.1} s", recording.duration_s());
     out(LiveUpdate::Scene(scene(leg, source, speed)));
-    let anatomy = anatomy::<N>(leg)?;
-    let picture = Picture::new(leg, anatomy, out).without_currents();
-    let mut player =
-        Player { picture, clock: Clock::new(speed), progress, background, report: &report, anatomy };
+    let picture = Picture::new(leg, out)?.without_currents();
+    let mut player = Player { picture, clock: Clock::new(speed), progress, report: &report };
     let first_s = recording.time_s.first().copied().unwrap_or(0.0);
     let (training, held_out) = match options.split {
         Some(share) => {
@@ -60,47 +61,40 @@ pub(crate) fn play<const N: usize, const B: usize>(
         }
         None => (recording, None),
     };
-    player.part(&training, first_s, Segment::Training, options.plan);
+    player.part(&training, first_s, Segment::Training);
     if let Some(held_out) = &held_out {
         player.use_result();
-        player.part(held_out, first_s, Segment::Validation(0), options.plan);
+        player.part(held_out, first_s, Segment::Validation(0));
     }
     player.picture.conclude(&report);
     player.picture.note(Severity::Note, "the source has ended");
     Ok(report)
 }
 
-struct Player<'a, const N: usize, const B: usize> {
-    picture: Picture<'a, N>,
+struct Player<'a> {
+    picture: Picture<'a>,
     clock: Clock,
-    progress: Progress<N, B>,
-    background: Background<N, B>,
+    progress: Box<dyn Progress>,
     report: &'a RunReport,
-    anatomy: [AnatomicalJoint<f64>; N],
 }
 
-impl<const N: usize, const B: usize> Player<'_, N, B> {
+impl Player<'_> {
     /// Plays a part; `first_s` is the recording's first time stamp.
-    fn part(&mut self, recording: &Recording, first_s: f64, segment: Segment, plan: Plan) {
+    fn part(&mut self, recording: &Recording, first_s: f64, segment: Segment) {
         let grid = Resampled::new(recording);
         self.picture.restart();
         for point in 0..grid.len() {
-            let (Some(position), Some(torque)) = (grid.position_rad::<N>(point), grid.torque_nm::<N>(point))
-            else {
-                break;
-            };
             let time_s = grid.time_s(point) - first_s;
-            let sample = LogSample {
-                position_rad: core::array::from_fn(|joint| {
-                    self.anatomy[joint].angle_to_chain(position[joint]) as f32
-                }),
-                torque_nm: core::array::from_fn(|joint| self.anatomy[joint].to_chain(torque[joint]) as f32),
-                counts_sum: [0; N],
-                tick: (point as u32).wrapping_mul(TICKS_PER_LOG),
+            let joints = || self.picture.anatomy().iter().zip(&grid.joints);
+            let position = joints().map(|(joint, series)| joint.angle_to_chain(series.position_rad[point]));
+            let torque = joints().map(|(joint, series)| joint.to_chain(series.torque_nm[point]));
+            let logged = LoggedMotion {
+                position_rad: position.map(|angle| angle as f32).collect(),
+                torque_nm: torque.map(|torque| torque as f32).collect(),
+                segment: Some(segment),
             };
-            let logged = LoggedSample { sample, segment: Some(segment) };
             self.picture.time_s = time_s + HALF_SAMPLE_S;
-            self.picture.learn(&logged, &mut self.progress, &self.background, plan);
+            self.picture.learn(&logged, &mut *self.progress);
             // Times may be negative by rounding, and a tick is 0.25 ms.
             let ticks = (time_s.max(0.0) * f64::from(SERVO_RATE_HZ)).round() as u64;
             if point % SAMPLES_PER_LOOK == 0 {
@@ -123,7 +117,7 @@ impl<const N: usize, const B: usize> Player<'_, N, B> {
         let curves = report.stribeck.iter().filter_map(|found| {
             Some((found.joint - 1, found.surplus_nm.known()?, found.speed_rad_s.known()?))
         });
-        self.progress.use_named(&self.background, value, curves);
+        self.progress.use_named(&value, &curves.collect::<Vec<_>>());
         self.picture.estimate(
             EstimateOrigin::Candidate,
             self.report.bso.iterations,

@@ -2,27 +2,23 @@
 //!
 //! The run is that of `identify` with the same options; an observer reports it and waits for the clock.
 
-use core::mem::replace;
+use core::mem::take;
 
 use hal_sim::world::TICK_S;
-use scarab::ident::Estimate;
-use scarab::leg::{Activity, ControlOutput, DriveState, IdentifyPhase, LimitCode, LimitCodes, Step};
+use scarab::leg::{Activity, DriveState, IdentifyPhase, LimitCode, LimitCodes};
 use scarab::trace::words;
 use scarab_base::error::ToolError;
-use scarab_base::names::VALIDATION_NAMES;
 use scarab_base::number::Number;
 use scarab_client::activity_words::{doing, not_enabled, waits_for};
 use scarab_identify::formats::leg_file::LegFile;
-use scarab_identify::formats::leg_file::geometry::anatomy;
 use scarab_identify::report::RunReport;
-use scarab_identify::report::findings::FindingReport;
+use scarab_identify::run::progress::Progress;
 use scarab_rig::options::SimulationOptions;
-use scarab_rig::pair::{Context, Pair};
+use scarab_rig::run_state::RunState;
 use scarab_rig::simulate::{Observer, simulate_observed};
 
 use crate::live::clock::{Clock, PERIOD_TICKS};
 use crate::live::picture::{Picture, scene};
-use crate::live::progress::Progress;
 use crate::live::report::{EstimateOrigin, LiveOutcome, LiveStatus, LiveUpdate, Severity};
 
 /// Ticks between two statuses: 0.2 s.
@@ -41,7 +37,7 @@ pub(crate) struct LiveOptions {
 ///
 /// # Errors
 /// Those of `identify`.
-pub(crate) fn identify<const N: usize, const B: usize>(
+pub(crate) fn identify(
     leg: &LegFile,
     options: &SimulationOptions,
     live: &LiveOptions,
@@ -49,7 +45,7 @@ pub(crate) fn identify<const N: usize, const B: usize>(
 ) -> Result<RunReport, ToolError> {
     let source = format!("simulated leg, {} drives, seed {}", options.drive.name(), options.seed);
     out(LiveUpdate::Scene(scene(leg, source, live.speed)));
-    let mut watched = Watched::<N, B>::new(Picture::new(leg, anatomy::<N>(leg)?, out), live.speed);
+    let mut watched = Watched::new(Picture::new(leg, out)?, live.speed);
     loop {
         watched.run += 1;
         let later = u64::from(watched.run - 1);
@@ -58,7 +54,7 @@ pub(crate) fn identify<const N: usize, const B: usize>(
             swarm_seed: options.swarm_seed.wrapping_add(later),
             ..options.clone()
         };
-        let run = simulate_observed::<N, B>(leg, &options, &mut watched)?;
+        let run = simulate_observed(leg, &options, &mut watched)?;
         watched.picture.conclude(&run.report);
         if watched.run == live.runs {
             watched.picture.note(Severity::Note, "the source has ended");
@@ -67,25 +63,19 @@ pub(crate) fn identify<const N: usize, const B: usize>(
     }
 }
 
-/// Context of a run and the progress of its identification.
-struct Known<const N: usize, const B: usize> {
-    context: Context<N, B>,
-    progress: Option<Progress<N, B>>,
-}
-
 /// Observer of the runs.
-struct Watched<'a, const N: usize, const B: usize> {
-    picture: Picture<'a, N>,
+struct Watched<'a> {
+    picture: Picture<'a>,
     clock: Clock,
     run: u32,
     /// Ticks of the earlier runs, and of this one.
     before: u64,
     ticks: u64,
-    known: Option<Known<N, B>>,
+    progress: Option<Box<dyn Progress>>,
     /// Drive state and activity of the last tick, and the tick of their last change.
     phase: Option<(DriveState, Activity)>,
     since: u64,
-    limits: [LimitCodes; N],
+    limits: Vec<LimitCodes>,
     last_logged: Option<u32>,
     iterations: u32,
     validated: usize,
@@ -96,18 +86,18 @@ fn is_same(one: DriveState, other: DriveState) -> bool {
     words::drive(one) == words::drive(other)
 }
 
-impl<'a, const N: usize, const B: usize> Watched<'a, N, B> {
-    fn new(picture: Picture<'a, N>, speed: f64) -> Self {
+impl<'a> Watched<'a> {
+    fn new(picture: Picture<'a>, speed: f64) -> Self {
         Self {
             picture,
             clock: Clock::new(speed),
             run: 0,
             before: 0,
             ticks: 0,
-            known: None,
+            progress: None,
             phase: None,
             since: 0,
-            limits: [LimitCodes::default(); N],
+            limits: Vec::new(),
             last_logged: None,
             iterations: 0,
             validated: 0,
@@ -119,78 +109,54 @@ impl<'a, const N: usize, const B: usize> Watched<'a, N, B> {
     }
 
     /// Reports the running search when it has advanced.
-    fn search(&mut self, pair: &Pair<N, B>) {
-        let solver = pair.leg.identification().solver().filter(|solver| solver.is_selected());
-        let (Some(solver), Some(known)) = (solver, &self.known) else { return };
-        let iterations = solver.search().iterations();
-        if iterations == self.iterations {
-            return;
-        }
-        self.iterations = iterations;
-        let estimate = Estimate { values: solver.search().values(), ..solver.least_squares().clone() };
-        let dropped = &solver.record().selection.dropped;
-        let base = known.context.background.base_parameters(dropped, &estimate, None);
-        self.picture.estimate(EstimateOrigin::Search, iterations, &base);
+    fn search(&mut self, run: &dyn RunState) {
+        let Some(found) = run.search(self.iterations) else { return };
+        self.iterations = found.iterations;
+        self.picture.estimate(EstimateOrigin::Search, found.iterations, &found.base);
     }
 
     /// Predicts with the result of the search, and reports it.
-    fn use_result(&mut self, pair: &Pair<N, B>) {
-        let identification = pair.leg.identification();
-        let (Some(solver), Some(known)) = (identification.solver(), &mut self.known) else { return };
-        if let Some(progress) = &mut known.progress {
-            progress.use_result(identification.model(), &solver.values());
+    fn use_result(&mut self, run: &dyn RunState) {
+        let Some(found) = run.result() else { return };
+        if let Some(progress) = &mut self.progress {
+            progress.use_result(&found.values, &found.stribeck);
         }
-        let dropped = &solver.record().selection.dropped;
-        let base = known.context.background.base_parameters(dropped, &solver.estimate(), None);
-        self.picture.estimate(EstimateOrigin::Candidate, solver.search().iterations(), &base);
+        self.picture.estimate(EstimateOrigin::Candidate, found.iterations, &found.base);
     }
 
     /// Reports the tests of the verdict after each unused motion.
-    fn judge(&mut self, pair: &Pair<N, B>) {
-        let identification = pair.leg.identification();
-        let validated = identification.validation().iter().flatten().count();
-        if validated == self.validated || identification.solver().is_none() {
+    fn judge(&mut self, run: &dyn RunState) {
+        let Some(validated) = run.validated().filter(|validated| *validated != self.validated) else {
             return;
-        }
+        };
         self.validated = validated;
-        let mut findings = Vec::new();
-        identification
-            .judge_with(&mut |evidence| findings.push(FindingReport::new(evidence, &VALIDATION_NAMES)));
-        let outcome = LiveOutcome { validated: true, findings, ..LiveOutcome::default() };
+        let outcome = LiveOutcome { validated: true, findings: run.findings(), ..LiveOutcome::default() };
         self.picture.send(LiveUpdate::Outcome(outcome));
     }
 
-    fn change(&mut self, pair: &Pair<N, B>, state: DriveState, activity: Activity) {
+    fn change(&mut self, run: &dyn RunState, state: DriveState, activity: Activity) {
         let was_enabled = self.phase.is_some_and(|(before, _)| before.is_enabled());
         self.since = self.ticks;
         if let Activity::Identify(IdentifyPhase::Validate { .. }) = activity {
-            self.use_result(pair);
+            self.use_result(run);
         }
         if was_enabled && !state.is_enabled() {
-            self.picture.note(Severity::Fault, pair.stop_words(self.picture.leg()));
+            self.picture.note(Severity::Fault, run.stop_words(self.picture.leg()));
         } else {
             self.picture.note(Severity::Note, format!("the leg {}", doing(activity, state)));
         }
     }
 
     /// Rest of the running motion, s.
-    fn left_s(&self, activity: Activity) -> Number {
-        let motions = self.known.as_ref().map(|known| &known.context.motions);
-        let motion = motions.and_then(|motions| match activity {
-            Activity::Identify(IdentifyPhase::Excite) => Some(&motions.excitation),
-            Activity::Identify(IdentifyPhase::Validate { motion, step: Step::Run }) => {
-                motions.validation.get(usize::from(motion))
-            }
-            _ => None,
-        });
+    fn left_s(&self, run: &dyn RunState, activity: Activity) -> Number {
         let elapsed = self.ticks - self.since;
-        let left = motion.map(|motion| u64::from(motion.duration_ticks()).saturating_sub(elapsed));
+        let left = run.motion_ticks(activity).map(|ticks| ticks.saturating_sub(elapsed));
         left.map(|ticks| ticks as f64 * TICK_S).into()
     }
 
-    fn status(&mut self, state: DriveState, activity: Activity) {
+    fn status(&mut self, run: &dyn RunState, state: DriveState, activity: Activity) {
         let joints = &self.picture.leg().joints;
-        let limits = replace(&mut self.limits, [LimitCodes::default(); N]);
+        let limits = take(&mut self.limits);
         let named = limits.iter().zip(joints).flat_map(|(codes, joint)| {
             let acting = LimitCode::ALL.into_iter().filter(|code| codes.contains(*code));
             acting.map(move |code| format!("{}: {}", joint.name, code.name().replace('_', " ")))
@@ -206,7 +172,7 @@ impl<'a, const N: usize, const B: usize> Watched<'a, N, B> {
             drive: words::drive(state).replace('_', " "),
             doing: doing(activity, state),
             waits_for: waits_for(activity, state).into(),
-            left_s: self.left_s(activity),
+            left_s: self.left_s(run, activity),
             not_enabled: not_enabled(state),
             fault: Some(fault.unwrap_or_default()),
             limits: Some(named.collect()),
@@ -218,13 +184,9 @@ impl<'a, const N: usize, const B: usize> Watched<'a, N, B> {
     }
 }
 
-impl<const N: usize, const B: usize> Observer<N, B> for Watched<'_, N, B> {
-    fn begin(&mut self, context: &Context<N, B>) {
-        let configuration = &context.configuration;
-        // The filter fits: the context was built with it.
-        let progress =
-            Progress::new(&configuration.model, configuration.bandwidth_hz, configuration.estimator).ok();
-        self.known = Some(Known { context: context.clone(), progress });
+impl Observer for Watched<'_> {
+    fn begin(&mut self, progress: Box<dyn Progress>) {
+        self.progress = Some(progress);
         (self.before, self.ticks) = (self.before + self.ticks, 0);
         (self.phase, self.last_logged) = (None, None);
         (self.iterations, self.validated) = (0, 0);
@@ -234,38 +196,38 @@ impl<const N: usize, const B: usize> Observer<N, B> for Watched<'_, N, B> {
         self.picture.note(Severity::Note, format!("identification {} begins", self.run));
     }
 
-    fn tick(&mut self, pair: &Pair<N, B>, output: &ControlOutput<N>) {
-        self.ticks = pair.ticks;
+    fn tick(&mut self, run: &dyn RunState) {
+        self.ticks = run.ticks();
         self.picture.time_s = self.time_s();
-        let control = pair.leg.control();
-        for (sum, codes) in self.limits.iter_mut().zip(control.limit_codes(output)) {
+        let limits = run.limit_codes();
+        self.limits.resize(limits.len(), LimitCodes::default());
+        for (sum, codes) in self.limits.iter_mut().zip(limits) {
             *sum = LimitCode::ALL.into_iter().fold(*sum, |sum, code| sum.with(codes.contains(code), code));
         }
-        self.picture.command(&output.motion.position_rad);
-        let (state, activity) = (control.state(), control.activity());
+        self.picture.command(run.commanded_rad());
+        let (state, activity) = (run.drive(), run.activity());
         let is_new = self.phase.is_none_or(|(before, was)| !is_same(before, state) || was != activity);
         if is_new {
-            self.change(pair, state, activity);
+            self.change(run, state, activity);
         }
         self.phase = Some((state, activity));
         if is_new {
-            self.status(state, activity);
+            self.status(run, state, activity);
         }
         // A board whose servo did not run repeats its last output.
-        if let Some(logged) = output.logged.filter(|logged| Some(logged.sample.tick) != self.last_logged) {
-            self.last_logged = Some(logged.sample.tick);
-            if let Some(Known { context, progress: Some(progress) }) = &mut self.known {
-                let plan = context.configuration.plan;
-                self.picture.learn(&logged, progress, &context.background, plan);
+        if let Some((tick, logged)) = run.logged().filter(|(tick, _)| Some(*tick) != self.last_logged) {
+            self.last_logged = Some(tick);
+            if let Some(progress) = &mut self.progress {
+                self.picture.learn(&logged, &mut **progress);
             }
         }
         if self.ticks.is_multiple_of(PERIOD_TICKS) {
             if activity == Activity::Identify(IdentifyPhase::Solve) {
-                self.search(pair);
+                self.search(run);
             }
             if self.ticks.is_multiple_of(STATUS_TICKS) {
-                self.judge(pair);
-                self.status(state, activity);
+                self.judge(run);
+                self.status(run, state, activity);
             }
             self.clock.wait(self.before + self.ticks);
         }

@@ -6,16 +6,13 @@
 use std::io::Read;
 use std::path::Path;
 
-use scarab::ident::{Estimator, Plan};
-use scarab::leg::{LoggedSample, Segment};
-use scarab::servo::{LogSample, SERVO_RATE_HZ, TICKS_PER_LOG};
+use scarab::leg::Segment;
+use scarab::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
 use scarab_base::error::ToolError;
 use scarab_base::number::Number;
 use scarab_identify::formats::leg_file::LegFile;
-use scarab_identify::formats::leg_file::geometry::anatomy;
-use scarab_identify::leg::background::Background;
-use scarab_identify::leg::setup::{PriorChoice, background};
 use scarab_identify::report::RunReport;
+use scarab_identify::run::progress::{LoggedMotion, Progress, ProgressOptions, progress};
 use scarab_rig::trace::events::{Event, Weight, doing};
 use scarab_rig::trace::read::Trace;
 use scarab_rig::trace::records::{Log, State};
@@ -24,7 +21,6 @@ use scarab_rig::traced::run_report;
 
 use crate::live::clock::Clock;
 use crate::live::picture::{Picture, scene};
-use crate::live::progress::Progress;
 use crate::live::report::{LiveStatus, LiveUpdate, Severity};
 
 /// Bytes taken at a time: a few records, so that a file is paced evenly.
@@ -46,21 +42,19 @@ pub(crate) struct TraceInput {
 ///
 /// # Errors
 /// The input cannot be read, has no record, or its last result belongs to another leg.
-pub(crate) fn follow<const N: usize, const B: usize>(
+pub(crate) fn follow(
     leg: &LegFile,
     source: TraceInput,
     out: &dyn Fn(LiveUpdate),
 ) -> Result<Option<RunReport>, ToolError> {
     let TraceInput { mut input, mut reader, name, speed } = source;
-    let background = background::<N, B>(leg, PriorChoice::Default, 0)?;
-    let progress = Progress::new(&background.device, leg.bandwidth_hz as f32, Estimator::Robust)?;
+    let progress = progress(leg, &ProgressOptions::new(leg.bandwidth_hz))?;
     let shown = Path::new(&name).file_name().unwrap_or_default().display();
     out(LiveUpdate::Scene(scene(leg, format!("trace {shown}"), speed.unwrap_or(1.0))));
-    let mut follower = Follower::<N, B> {
-        picture: Picture::new(leg, anatomy::<N>(leg)?, out),
+    let mut follower = Follower {
+        picture: Picture::new(leg, out)?,
         clock: speed.map(Clock::new),
         progress,
-        background,
         ticks: Ticks::default(),
         events: 0,
         results: 0,
@@ -110,11 +104,10 @@ impl Ticks {
     }
 }
 
-struct Follower<'a, const N: usize, const B: usize> {
-    picture: Picture<'a, N>,
+struct Follower<'a> {
+    picture: Picture<'a>,
     clock: Option<Clock>,
-    progress: Progress<N, B>,
-    background: Background<N, B>,
+    progress: Box<dyn Progress>,
     ticks: Ticks,
     /// Events and results that were reported.
     events: usize,
@@ -126,7 +119,7 @@ struct Follower<'a, const N: usize, const B: usize> {
     report: Option<RunReport>,
 }
 
-impl<const N: usize, const B: usize> Follower<'_, N, B> {
+impl Follower<'_> {
     /// Reports what the trace has received since the last call.
     fn take(&mut self, trace: &mut Trace, leg: &LegFile) -> Result<(), ToolError> {
         for (_, sample) in core::mem::take(&mut trace.log) {
@@ -167,7 +160,8 @@ impl<const N: usize, const B: usize> Follower<'_, N, B> {
     }
 
     fn log(&mut self, log: &Log) {
-        if [log.position_rad.len(), log.torque_nm.len(), log.counts.len()] != [N; 3] {
+        let joints = self.picture.anatomy().len();
+        if [log.position_rad.len(), log.torque_nm.len(), log.counts.len()] != [joints; 3] {
             return;
         }
         self.at(log.tick);
@@ -177,19 +171,14 @@ impl<const N: usize, const B: usize> Follower<'_, N, B> {
             ("tracking", _) => Some(Segment::Tracking),
             _ => None,
         };
-        let sample = LogSample {
-            position_rad: core::array::from_fn(|joint| log.position_rad[joint]),
-            torque_nm: core::array::from_fn(|joint| log.torque_nm[joint]),
-            counts_sum: core::array::from_fn(|joint| log.counts[joint]),
-            tick: log.tick,
-        };
-        let logged = LoggedSample { sample, segment };
+        let (position_rad, torque_nm) = (log.position_rad.clone(), log.torque_nm.clone());
+        let logged = LoggedMotion { position_rad, torque_nm, segment };
         if self.last_logged.is_some_and(|last| log.tick.wrapping_sub(last) != TICKS_PER_LOG) {
             self.progress.break_off();
             self.picture.restart();
         }
         self.last_logged = Some(log.tick);
-        self.picture.learn(&logged, &mut self.progress, &self.background, Plan::OneTime);
+        self.picture.learn(&logged, &mut *self.progress);
     }
 
     fn event(&mut self, event: &Event) {

@@ -3,7 +3,7 @@
 use scarab::model::{AnatomicalJoint, Chain, DenavitHartenberg, Fingerprint};
 use scarab_base::error::FileError;
 
-use super::{BodySide, LegFile};
+use super::{BodySide, JointFile, LegFile};
 
 /// Kinematic chain of a leg.
 pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, FileError> {
@@ -19,14 +19,20 @@ pub fn chain<const N: usize>(leg: &LegFile) -> Result<Chain<f64, N>, FileError> 
 }
 
 /// Anatomical to D-H angles of every joint.
+pub fn anatomical_joints(leg: &LegFile) -> Result<Vec<AnatomicalJoint<f64>>, FileError> {
+    let joint = |joint: &JointFile| {
+        let direction = if joint.direction < 0 { -1 } else { 1 };
+        AnatomicalJoint::new(direction, joint.zero_offset_deg.to_radians()).map_err(|_| {
+            leg.error(format!("joint {}: `direction` or `zero_offset_deg` is invalid", joint.name))
+        })
+    };
+    leg.joints.iter().map(joint).collect()
+}
+
+/// [`anatomical_joints`] of a leg of this size.
 pub fn anatomy<const N: usize>(leg: &LegFile) -> Result<[AnatomicalJoint<f64>; N], FileError> {
     let mut joints = [AnatomicalJoint::identity(); N];
-    for (slot, joint) in joints.iter_mut().zip(&leg.joints) {
-        let direction = if joint.direction < 0 { -1 } else { 1 };
-        *slot = AnatomicalJoint::new(direction, joint.zero_offset_deg.to_radians()).map_err(|_| {
-            leg.error(format!("joint {}: `direction` or `zero_offset_deg` is invalid", joint.name))
-        })?;
-    }
+    joints.iter_mut().zip(anatomical_joints(leg)?).for_each(|(slot, joint)| *slot = joint);
     Ok(joints)
 }
 

@@ -9,11 +9,8 @@ use scarab::ident::{
 };
 use scarab::model::Parameter;
 
-use crate::run::logging_errors::rows::TAPS;
 use crate::run::logging_errors::table::Table;
-
-/// Open outputs of the row filter.
-const PENDING: usize = 205;
+use crate::run::replay::{PENDING, TAPS};
 
 /// Smoothed motion of all joints at one instant.
 #[derive(Clone, Debug, PartialEq)]

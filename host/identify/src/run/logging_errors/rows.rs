@@ -20,9 +20,8 @@ use scarab_base::stats::{quantile, rms};
 use crate::run::logging_errors::fit::{Fit, Score, score, segment_sigma, solve};
 use crate::run::logging_errors::regressor::{Filtered, Instant, Regressor};
 use crate::run::logging_errors::table::Table;
+use crate::run::replay::TAPS;
 
-/// Reserved filter taps: bandwidths from 1 Hz.
-pub(crate) const TAPS: usize = 2048;
 /// Rows of a block with a common weight.
 const BLOCK_ROWS: usize = 16;
 /// Residual of a block over the median, from which its weight falls, and at which it is zero.

@@ -16,9 +16,9 @@ use crate::report::Source;
 use crate::run::resample::Resampled;
 
 /// Reserved filter taps: bandwidths from 1 Hz.
-pub(super) const TAPS: usize = 2048;
+pub(crate) const TAPS: usize = 2048;
 /// Open outputs of that filter.
-pub(super) const PENDING: usize = 205;
+pub(crate) const PENDING: usize = 205;
 /// Sample time of the firmware, s.
 pub(super) const GRID_S: f64 = 1.0 / SAMPLE_RATE_HZ;
 /// Above this bandwidth, 50 Hz rows alias the noise that the low-pass passes, and sigma becomes too small.

@@ -2,7 +2,6 @@
 
 use std::fmt::Write;
 
-
 use scarab::model::planar::JOINTS;
 use scarab_base::error::{FileError, ToolError};
 use scarab_identify::formats::leg_file::draft::truth_text;

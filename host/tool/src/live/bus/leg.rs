@@ -1,24 +1,20 @@
 //! Picture of one leg from what its nodes have shown.
 
 use scarab::bus::Frame;
-use scarab::ident::{Estimate, Estimator, Plan, Reason};
-use scarab::leg::{LoggedSample, Segment};
-use scarab::model::AnatomicalJoint;
-use scarab::servo::{LOG_RATE_HZ, LogSample, TICKS_PER_LOG};
+use scarab::ident::Reason;
+use scarab::leg::Segment;
+use scarab::servo::LOG_RATE_HZ;
 use scarab_base::error::ToolError;
 use scarab_base::number::Number;
 use scarab_client::alarms::{Alarms, reason};
 use scarab_client::words::{JointState, doing};
 use scarab_identify::formats::leg_file::LegFile;
-use scarab_identify::formats::leg_file::geometry::anatomy;
 use scarab_identify::formats::model_file::ModelFile;
-use scarab_identify::leg::background::Background;
-use scarab_identify::leg::setup::{PriorChoice, background};
+use scarab_identify::run::progress::{LoggedMotion, Progress, ProgressOptions, progress};
 
 use crate::live::bus::BusStatus;
 use crate::live::bus::node::{Event, NmtState, Node};
 use crate::live::picture::{HALF_SAMPLE_S, Picture};
-use crate::live::progress::Progress;
 use crate::live::report::{EstimateOrigin, LiveOutcome, LiveStatus, LiveUpdate, Severity};
 
 /// Objects that are shown.
@@ -50,35 +46,33 @@ const NO_POSITION_S: f64 = 2.0;
 const REPEATED_S: f64 = 1.0;
 /// Bandwidth of torque and prediction, Hz: an adapter's times scatter by a millisecond, and the acceleration
 /// is their second derivative.
-const BANDWIDTH_HZ: f32 = 5.0;
+const BANDWIDTH_HZ: f64 = 5.0;
 const SAMPLE_S: f64 = 1.0 / LOG_RATE_HZ as f64;
 
 /// Positions of all joints at one time, and torques if the bus carries them; the model's angles and signs.
-#[derive(Clone, Copy)]
-struct Measured<const N: usize> {
+#[derive(Clone)]
+struct Measured {
     time_s: f64,
     /// Time of the last frame that belongs to it.
     until_s: f64,
-    position: [f64; N],
+    position: Vec<f64>,
     /// Torques, N m; not a number if unknown.
-    torque: [f64; N],
+    torque: Vec<f64>,
 }
 
 /// One leg of the bus.
-pub(crate) struct Leg<'a, const N: usize, const B: usize> {
-    picture: Picture<'a, N>,
-    progress: Progress<N, B>,
-    background: Background<N, B>,
-    anatomy: [AnatomicalJoint<f64>; N],
-    nodes: [Node; N],
+pub(crate) struct Leg<'a> {
+    picture: Picture<'a>,
+    progress: Box<dyn Progress>,
+    nodes: Vec<Node>,
     alarms: Alarms,
     /// Words of the last fault in an emergency message.
     fault: Option<&'static str>,
     /// Last line about an emergency message, and its time, s.
     line: (String, f64),
-    last: Option<Measured<N>>,
+    last: Option<Measured>,
     /// Times of positions that wait for their torques, s.
-    waiting: Option<[f64; N]>,
+    waiting: Option<Vec<f64>>,
     /// Whether the lack of positions was reported.
     lacks_positions: bool,
     /// Number of the next point of the 500 Hz grid.
@@ -90,35 +84,33 @@ pub(crate) struct Leg<'a, const N: usize, const B: usize> {
     verdict: Option<(u32, u32)>,
 }
 
-impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
+impl<'a> Leg<'a> {
     /// A leg with one node per joint, proximal first; `model` predicts its torque.
     ///
     /// # Errors
     /// The leg file is incomplete, or its filter does not fit.
     pub fn new(
         leg: &'a LegFile,
-        ids: [u8; N],
+        ids: &[u8],
         index: usize,
         model: Option<&ModelFile>,
         out: &'a dyn Fn(LiveUpdate),
     ) -> Result<Self, ToolError> {
         // The leg on the bus is not the one of the leg file: its true parameters are unknown.
-        let background = Background { truth: None, ..background::<N, B>(leg, PriorChoice::Default, 0)? };
-        let mut progress = Progress::new(&background.device, BANDWIDTH_HZ, Estimator::Robust)?;
+        let options = ProgressOptions { knows_truth: false, ..ProgressOptions::new(BANDWIDTH_HZ) };
+        let mut progress = progress(leg, &options)?;
         if let Some(model) = model {
             let set = &model.base_set;
             let value =
                 |name: &str| set.parameters.iter().find(|base| base.name == name).map(|base| base.value);
             let curves =
                 set.stribeck.iter().map(|curve| (curve.joint - 1, curve.surplus_nm, curve.speed_rad_s));
-            progress.use_named(&background, value, curves);
+            progress.use_named(&value, &curves.collect::<Vec<_>>());
         }
         Ok(Self {
-            picture: Picture::new(leg, anatomy::<N>(leg)?, out).at(index),
+            picture: Picture::new(leg, out)?.at(index),
             progress,
-            background,
-            anatomy: anatomy::<N>(leg)?,
-            nodes: ids.map(Node::new),
+            nodes: ids.iter().copied().map(Node::new).collect(),
             alarms: Alarms::default(),
             fault: None,
             line: (String::new(), f64::NEG_INFINITY),
@@ -135,7 +127,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     /// Takes a frame of the bus; `prefix` names the leg in the timeline.
     pub(crate) fn take(&mut self, frame: &Frame, now_s: f64, prefix: &str) {
         self.picture.time_s = now_s;
-        for joint in 0..N {
+        for joint in 0..self.nodes.len() {
             let name = &self.picture.leg().joints[joint].name;
             match self.nodes[joint].take(frame, now_s) {
                 Some(Event::Nmt(state)) => {
@@ -172,45 +164,48 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     }
 
     /// Value that every joint's node has, each by this function.
-    fn each<T>(&self, value: impl Fn(&Node) -> Option<T>) -> Option<[T; N]> {
-        let values: Option<Vec<T>> = self.nodes.iter().map(value).collect();
-        values?.try_into().ok()
+    fn each<T>(&self, value: impl Fn(&Node) -> Option<T>) -> Option<Vec<T>> {
+        self.nodes.iter().map(value).collect()
+    }
+
+    /// Value of each joint.
+    fn of_joints<T>(&self, value: impl Fn(usize) -> T) -> Vec<T> {
+        (0..self.nodes.len()).map(value).collect()
     }
 
     /// Draws the motion up to the present positions once every joint has a new one, with its torque if the
     /// bus carries torques.
     fn measure(&mut self) {
-        let since = self.last.map_or(f64::NEG_INFINITY, |last| last.until_s);
+        let since = self.last.as_ref().map_or(f64::NEG_INFINITY, |last| last.until_s);
         let now_s = self.picture.time_s;
         let at = |object: u16| self.each(|node| node.time_s(object, 0));
         let Some(positions_at) = at(POSITION).filter(|at| at.iter().all(|at| *at > since)) else { return };
         let torques_at = at(TORQUE).filter(|at| at.iter().all(|at| now_s - *at < STALE_S));
-        let has_torques = torques_at.is_some_and(|at| at.iter().all(|at| *at > since));
+        let has_torques = torques_at.as_ref().is_some_and(|at| at.iter().all(|at| *at > since));
         if torques_at.is_some() && !has_torques {
             // Torques of the same cycle come later, if they come each cycle.
-            let waiting = *self.waiting.get_or_insert(positions_at);
-            if !positions_at.iter().zip(waiting).all(|(at, waiting)| *at > waiting) {
+            let waiting = self.waiting.get_or_insert_with(|| positions_at.clone());
+            if !positions_at.iter().zip(waiting).all(|(at, waiting)| *at > *waiting) {
                 return;
             }
         }
         self.waiting = None;
         let torques_at = torques_at.filter(|_| has_torques);
         let Some(position) = self.each(|node| node.signed(POSITION)) else { return };
-        let torque = torques_at.and_then(|_| self.each(|node| node.signed(TORQUE)));
-        let used = || positions_at.into_iter().chain(torques_at.into_iter().flatten());
+        let torque = torques_at.as_ref().and_then(|_| self.each(|node| node.signed(TORQUE)));
+        let anatomy = self.picture.anatomy();
         let measured = Measured {
             // All nodes measure at a SYNC and answer one after the other.
-            time_s: positions_at.into_iter().fold(f64::INFINITY, f64::min),
-            until_s: used().fold(0.0, f64::max),
-            position: core::array::from_fn(|joint| {
-                self.anatomy[joint].angle_to_chain(f64::from(position[joint]) * 1e-6)
-            }),
-            torque: core::array::from_fn(|joint| {
-                let thousandths = torque.map_or(f64::NAN, |torque| f64::from(torque[joint]));
-                self.anatomy[joint].to_chain(thousandths * 1e-3 * self.rated_torque(joint))
+            time_s: positions_at.iter().copied().fold(f64::INFINITY, f64::min),
+            until_s: positions_at.iter().chain(torques_at.iter().flatten()).copied().fold(0.0, f64::max),
+            position: self
+                .of_joints(|joint| anatomy[joint].angle_to_chain(f64::from(position[joint]) * 1e-6)),
+            torque: self.of_joints(|joint| {
+                let thousandths = torque.as_ref().map_or(f64::NAN, |torque| f64::from(torque[joint]));
+                anatomy[joint].to_chain(thousandths * 1e-3 * self.rated_torque(joint))
             }),
         };
-        match self.last.filter(|last| measured.time_s - last.time_s <= LONGEST_GAP_S) {
+        match self.last.take().filter(|last| measured.time_s - last.time_s <= LONGEST_GAP_S) {
             Some(last) => self.draw(&last, &measured),
             None => {
                 self.progress.break_off();
@@ -229,32 +224,29 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     }
 
     /// Adds the 500 Hz samples between two measurements, by linear interpolation.
-    fn draw(&mut self, from: &Measured<N>, to: &Measured<N>) {
+    fn draw(&mut self, from: &Measured, to: &Measured) {
         let now_s = self.picture.time_s;
         let target_at = self.each(|node| node.time_s(TARGET, 0));
         let is_present = target_at.is_some_and(|at| at.iter().all(|at| now_s - *at < STALE_S));
         let target = self.each(|node| node.signed(TARGET)).filter(|_| is_present);
-        let target = target.map(|target| -> [f32; N] {
-            core::array::from_fn(|joint| {
-                self.anatomy[joint].angle_to_chain(f64::from(target[joint]) * 1e-6) as f32
-            })
+        let anatomy = self.picture.anatomy();
+        let target = target.map(|target| {
+            self.of_joints(|joint| anatomy[joint].angle_to_chain(f64::from(target[joint]) * 1e-6) as f32)
         });
         while self.next as f64 * SAMPLE_S <= to.time_s {
             let time_s = self.next as f64 * SAMPLE_S;
             let share = ((time_s - from.time_s) / (to.time_s - from.time_s)).clamp(0.0, 1.0);
             let between = |from: f64, to: f64| (from + share * (to - from)) as f32;
-            let sample = LogSample {
-                position_rad: core::array::from_fn(|joint| between(from.position[joint], to.position[joint])),
-                torque_nm: core::array::from_fn(|joint| between(from.torque[joint], to.torque[joint])),
-                counts_sum: [0; N],
-                tick: (self.next as u32).wrapping_mul(TICKS_PER_LOG),
+            let logged = LoggedMotion {
+                position_rad: self.of_joints(|joint| between(from.position[joint], to.position[joint])),
+                torque_nm: self.of_joints(|joint| between(from.torque[joint], to.torque[joint])),
+                segment: Some(Segment::Tracking),
             };
             self.picture.time_s = time_s + HALF_SAMPLE_S;
             if let Some(target) = &target {
                 self.picture.command(target);
             }
-            let logged = LoggedSample { sample, segment: Some(Segment::Tracking) };
-            self.picture.learn(&logged, &mut self.progress, &self.background, Plan::OneTime);
+            self.picture.learn(&logged, &mut *self.progress);
             self.next += 1;
         }
     }
@@ -265,7 +257,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         self.report_parameters();
         self.report_verdict();
         let status = self.status(bus);
-        let since_s = self.last.map_or(0.0, |last| last.until_s);
+        let since_s = self.last.as_ref().map_or(0.0, |last| last.until_s);
         let has_state = self.nodes.iter().any(|node| node.time_s(STATUSWORD, 0).is_some());
         let lacks_positions = has_state && now_s - since_s > NO_POSITION_S;
         if lacks_positions && !self.lacks_positions && !bus.has_ended {
@@ -287,21 +279,17 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
     /// Reports the parameters once a host has read them.
     fn report_parameters(&mut self) {
         let node = &self.nodes[0];
-        let rank = self.background.model.base.rank();
         let base = |index: usize| {
             let sub = u8::try_from(index + 1).ok()?;
             Some([node.real(BASE, sub)?, node.real(BASE_SIGMA, sub)?])
         };
-        let Some(base) = (0..rank).map(base).collect::<Option<Vec<[f32; 2]>>>() else { return };
+        let Some(base) = (0..self.progress.rank()).map(base).collect::<Option<Vec<[f32; 2]>>>() else {
+            return;
+        };
         if base != self.base {
-            let mut estimate = Estimate::nothing();
-            for (index, [value, sigma]) in base.iter().enumerate() {
-                estimate.values[index] = *value;
-                estimate.covariance[index][index] = sigma * sigma;
-                estimate.determined[index] = true;
-            }
-            self.progress.use_result(&self.background.device, &estimate.values);
-            let reports = self.background.base_parameters(&[false; B], &estimate, None);
+            let values: Vec<f32> = base.iter().map(|[value, _]| *value).collect();
+            self.progress.use_result(&values, &[]);
+            let reports = self.progress.reports(&base);
             self.picture.estimate(
                 EstimateOrigin::Result,
                 node.raw(IDENTIFICATION, 10).unwrap_or(0),
@@ -334,17 +322,17 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
         let named = |joint: usize, words: &str| format!("{}: {words}", joints[joint].name);
         let now_s = self.picture.time_s;
         let is_heard = |node: &Node| !bus.has_ended && node.heard_s().is_some_and(|at| now_s - at < SILENT_S);
-        let states = self.nodes.each_ref().map(|node| {
-            node.raw(STATUSWORD, 0)
-                .filter(|_| is_heard(node))
-                .and_then(|word| JointState::from_statusword(word as u16))
-        });
+        let state = |node: &Node| {
+            let word = node.raw(STATUSWORD, 0).filter(|_| is_heard(node))?;
+            JointState::from_statusword(word as u16)
+        };
+        let states: Vec<Option<JointState>> = self.nodes.iter().map(state).collect();
         let is_same = states.iter().all(|state| *state == states[0]);
         let name = |state: Option<JointState>| state.map_or("unknown", JointState::name);
         let drive = if is_same {
             name(states[0]).to_owned()
         } else {
-            (0..N).map(|joint| named(joint, name(states[joint]))).collect::<Vec<_>>().join("; ")
+            self.of_joints(|joint| named(joint, name(states[joint]))).join("; ")
         };
         let lowest = states.iter().flatten().min().copied().filter(|_| states.iter().all(Option::is_some));
         let is_enabled = lowest.is_some_and(JointState::is_enabled);
@@ -372,7 +360,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             Some(_) if !is_enabled => self.not_enabled(),
             _ => String::new(),
         };
-        let limited = (0..N).filter(|joint| {
+        let limited = (0..self.nodes.len()).filter(|joint| {
             self.nodes[*joint].raw(STATUSWORD, 0).is_some_and(|word| word & INTERNAL_LIMIT != 0)
         });
         LiveStatus {
@@ -398,7 +386,7 @@ impl<'a, const N: usize, const B: usize> Leg<'a, N, B> {
             let at_s = self.nodes[0].time_s(IDENTIFICATION, sub)?;
             self.nodes[0].raw(IDENTIFICATION, sub).filter(|_| self.picture.time_s - at_s < STALE_S)
         };
-        let modes = self.nodes.each_ref().map(|node| node.signed(node.newest(&MODE)?));
+        let modes = self.of_joints(|joint| self.nodes[joint].signed(self.nodes[joint].newest(&MODE)?));
         doing(present(2), present(3), &modes)
     }
 
@@ -427,7 +415,7 @@ mod tests {
 
     /// Reports about a leg of nodes 1 and 2.
     struct Bench<'a> {
-        leg: Leg<'a, 2, 13>,
+        leg: Leg<'a>,
         reports: &'a RefCell<Vec<LiveUpdate>>,
     }
 
@@ -468,7 +456,7 @@ mod tests {
         let file = LegFile::load(DEFAULT_LEG).expect("shipped");
         let reports = RefCell::new(Vec::new());
         let out = |report| reports.borrow_mut().push(report);
-        let leg = Leg::new(&file, [1, 2], 0, None, &out).expect("the default leg");
+        let leg = Leg::new(&file, &[1, 2], 0, None, &out).expect("the default leg");
         test(&mut Bench { leg, reports: &reports });
     }
 
