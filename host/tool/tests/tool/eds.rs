@@ -17,11 +17,18 @@ struct Live {
 }
 
 impl Live {
-    fn new() -> Self {
-        let constants =
-            AxisConstants { rated_torque: NewtonMetre(40.0), rated_current: Ampere(20.0), modes: 0, ..AxisConstants::UNKNOWN };
+    fn new(joint: usize) -> Self {
+        let constants = AxisConstants {
+            rated_torque: NewtonMetre(40.0),
+            rated_current: Ampere(20.0),
+            modes: 0,
+            ..AxisConstants::UNKNOWN
+        };
         let node = NodeId::new(NODE).expect("a number");
-        let mut live = Self { node: Node::new(node, Identity::scarab(1, "3.6")), axis: Axis::new(constants) };
+        let mut live = Self {
+            node: Node::new(node, Identity::scarab(1, "3.6").for_joint(joint)),
+            axis: Axis::new(constants),
+        };
         assert_eq!(live.node.poll(0, &mut live.axis), Some(Frame::new(0x702, &[0])));
         live
     }
@@ -69,11 +76,11 @@ fn the_sheet_lists_exactly_the_node_s_objects_with_size_and_default() {
     let folder = Folder::new();
     let out = folder.path("sheets");
     let run = folder.scarab("eds --out @sheets").ends_with(0);
-    for joint in ["hip", "knee"] {
+    for (position, joint) in ["hip", "knee"].into_iter().enumerate() {
         let path = out.join(format!("scarab-{joint}.eds"));
         run.prints(&format!("electronic data sheet: {}\n", path.display()));
         let sheet = sections(&std::fs::read_to_string(&path).expect("just written"));
-        let mut live = Live::new();
+        let mut live = Live::new(position);
         let mut listed = Vec::new();
         for list in ["MandatoryObjects", "OptionalObjects", "ManufacturerObjects"] {
             let list = &sheet[list];
@@ -106,8 +113,13 @@ fn the_sheet_lists_exactly_the_node_s_objects_with_size_and_default() {
                     _ => continue,
                 };
                 // Objects of a leg cannot be read from a joint alone, and no error has been recorded yet.
-                if command == 0x80 && matches!(index, 0x2100..0x219A | 0x1003) {
-                    assert_eq!(value, 0x0800_0024);
+                let refused = match index {
+                    0x1F50..0x1F58 => Some(0x0602_0000),
+                    0x1003 | 0x2100..0x219A => Some(0x0800_0024),
+                    _ => None,
+                };
+                if command == 0x80 && refused.is_some() {
+                    assert_eq!(Some(value), refused, "{index:x} {sub}");
                     continue;
                 }
                 assert_eq!(command, 0x43 | (4 - size) << 2, "{index:x} {sub}");

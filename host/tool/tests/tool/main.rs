@@ -4,6 +4,7 @@
 mod bus;
 mod chain;
 mod command;
+mod eds;
 mod excite;
 mod excite_samples;
 mod faults;
