@@ -16,7 +16,7 @@ use super::nmt::Reset;
 use super::node::Node;
 use super::node_id::NodeId;
 use super::objects::Objects;
-use super::table::ROWS;
+use super::table::{ROWS, is_of_leg};
 
 /// Capacity for one node's stored parameters in bytes, as in the store.
 pub const LONGEST: usize = 400;
@@ -57,8 +57,8 @@ const OFF: u32 = 1 << 31;
 const fn is_stored(row: &Row) -> bool {
     let commands =
         matches!(row.index, 0x2020 | 0x6040 | 0x6071 | 0x607A | 0x60B1 | 0x60B2 | 0x60C1 | 0x60FE | 0x60FF);
-    let others = matches!(row.index, 0x1003 | 0x1010 | 0x1011 | 0x1F50..=0x1F57 | 0x2100..=0x2198);
-    matches!(row.access, Access::Both) && !commands && !others
+    let others = matches!(row.index, 0x1003 | 0x1010 | 0x1011 | 0x1F50..=0x1F57 | 0x2194);
+    matches!(row.access, Access::Both) && !commands && !others && !is_of_leg(row.index)
 }
 
 /// All objects that are stored, in the table's order.

@@ -56,6 +56,12 @@ pub static GROUPS: &[(u16, u16, &str, bool)] = &[
     (0x60FE, 1, "Digital outputs", false),
 ];
 
+/// Whether an object belongs to the leg: identification, assistance, commissioning or telemetry. A joint
+/// alone does not have it.
+pub(super) const fn is_of_leg(index: u16) -> bool {
+    matches!(index, 0x2100..=0x2193)
+}
+
 macro_rules! rows {
     (@count) => { 1 };
     (@count $count:literal) => { $count };

@@ -7,6 +7,7 @@
 
 mod tokens;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -67,7 +68,7 @@ const HOST: [(&str, &[&[&str]]); 4] = [
             &["image", "parameter_file", "report", "trace"],
             &["board", "faulty_board", "operator", "options", "pair", "perturb", "worn"],
             &["bus", "excite", "identified"],
-            &["scale", "shaking", "simulate", "watch"],
+            &["run_state", "scale", "shaking", "simulate", "watch"],
             &["assist", "identify", "monitor", "motor"],
             &["faults", "traced"],
         ],
@@ -305,6 +306,43 @@ fn no_source_file_is_longer_than_nine_hundred_lines() {
         .map(|file| (file.text.lines().count(), file.path))
         .filter(|(lines, _)| *lines > LARGEST_LINE_COUNT)
         .map(|(lines, path)| format!("{path}: {lines} lines, split it by meaning"))
+        .collect();
+    assert_none(&offences);
+}
+
+/// A file that no `mod` names is not compiled, and its tests look as if they passed.
+#[test]
+fn every_source_file_is_compiled() {
+    let folders = SOURCES.into_iter().chain(["tests", "host/tool/tests/tool", "chip/tests"]);
+    let files: Vec<_> = folders.flat_map(source_files).collect();
+    let mut named = BTreeSet::new();
+    for file in &files {
+        let path = Path::new(&file.path);
+        let folder = path.parent().unwrap_or(path);
+        let own = folder.join(path.file_stem().unwrap_or_default());
+        let modules = file.text.lines().filter_map(|line| {
+            let line = line.trim().strip_suffix(';')?;
+            Some(line.rsplit_once("mod ")?.1.to_owned())
+        });
+        for module in modules {
+            for parent in [folder, &own] {
+                named.insert(parent.join(format!("{module}.rs")));
+                named.insert(parent.join(&module).join("mod.rs"));
+            }
+        }
+        let quoted = file.text.split("path = \"").skip(1).filter_map(|rest| rest.split_once('"'));
+        named.extend(quoted.map(|(path, _)| folder.join(path)));
+    }
+    // Roots of crates, and programs of one file.
+    let is_root = |path: &Path| {
+        path.file_name().is_some_and(|name| name == "lib.rs" || name == "main.rs")
+            || path.ends_with("chip/tests/processor.rs")
+    };
+    let offences: Vec<String> = files
+        .iter()
+        .map(|file| Path::new(&file.path))
+        .filter(|path| !is_root(path) && !named.contains(*path))
+        .map(|path| format!("{}: no `mod` names it", path.display()))
         .collect();
     assert_none(&offences);
 }

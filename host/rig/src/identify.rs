@@ -4,11 +4,8 @@ use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use scarab::leg::LoggedSample;
-use scarab::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
-use scarab_identify::formats::recording::{JointSeries, Recording};
 use scarab_identify::report::RunReport;
 use scarab_identify::report::series::Series;
 
@@ -46,28 +43,4 @@ pub fn identify_many(leg: &LegFile, options: &[SimulationOptions]) -> Result<Vec
         .collect();
     progress.finish_and_clear();
     runs
-}
-
-/// Recording of samples of a log: anatomical angles and torques. `name` stands for the file.
-pub(crate) fn recorded<const N: usize>(name: &Path, leg: &LegFile, log: &[LoggedSample<N>]) -> Recording {
-    let mut recording = Recording {
-        file: name.to_owned(),
-        time_s: Vec::with_capacity(log.len()),
-        joints: vec![JointSeries::default(); N],
-        joints_in_file: N,
-    };
-    let first = log.first().map_or(0, |logged| logged.sample.tick);
-    for logged in log {
-        let ticks = logged.sample.tick.wrapping_sub(first);
-        recording.time_s.push(f64::from(ticks) / f64::from(SERVO_RATE_HZ));
-        for (joint, series) in recording.joints.iter_mut().enumerate() {
-            let file = &leg.joints[joint];
-            let radian_per_count = file.encoder.step_rad();
-            let counts = f64::from(logged.sample.counts_sum[joint]) / f64::from(TICKS_PER_LOG);
-            let direction = if file.direction < 0 { -1.0 } else { 1.0 };
-            series.position_rad.push(leg.side.mounting() * counts * radian_per_count);
-            series.torque_nm.push(direction * f64::from(logged.sample.torque_nm[joint]));
-        }
-    }
-    recording
 }

@@ -7,7 +7,8 @@
 //! | [`bus`] | boards on a simulated bus, also behind a port |
 //! | [`parameter_file`] | stored data of a board |
 //! | [`trace`], [`traced`] | records of a trace; the run that they tell of |
-//! | [`simulate`], [`run_state`], [`identify`], [`identified`], [`watch`], [`scale`] | a simulated leg is identified |
+//! | [`simulate`], [`run_state`], [`watch`], [`scale`] | a simulated leg is identified |
+//! | [`identify`], [`identified`] | one or many such runs |
 //! | [`excite`], [`shaking`] | design of an exciting motion |
 //! | [`monitor`], [`assist`], [`motor`] | a watched model, an assisted wearer, a motor stand |
 //! | [`report`] | results of assistance, monitor and motor stand |

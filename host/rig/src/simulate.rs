@@ -7,15 +7,15 @@ use hal_sim::world::TICK_S;
 use scarab::leg::{Activity, ControlRequest, IdentifyPhase, LegConfiguration, LoggedSample, Segment, Step};
 use scarab::motion::Periodic;
 use scarab::real::sqrt;
+use scarab::servo::{SERVO_RATE_HZ, TICKS_PER_LOG};
 use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
-use scarab_identify::formats::recording::Recording;
+use scarab_identify::formats::recording::{JointSeries, Recording};
 use scarab_identify::report::series::Series;
 use scarab_identify::report::{RunReport, TrackingReport};
 use scarab_identify::run::progress::{self, Progress};
 use scarab_identify::with_leg_size;
 
-use crate::identify::recorded;
 use crate::options::SimulationOptions;
 use crate::pair::{Context, Pair};
 use crate::run_state::{RunState, Tick};
@@ -103,6 +103,30 @@ fn recordings<const N: usize>(leg: &LegFile, log: &[LoggedSample<N>]) -> Vec<Rec
     };
     let recorded = segments.map(|segment| recorded(Path::new("simulation"), leg, &of(segment)));
     recorded.take_while(|recording| !recording.time_s.is_empty()).collect()
+}
+
+/// Recording of samples of a log: anatomical angles and torques. `name` stands for the file.
+pub(crate) fn recorded<const N: usize>(name: &Path, leg: &LegFile, log: &[LoggedSample<N>]) -> Recording {
+    let mut recording = Recording {
+        file: name.to_owned(),
+        time_s: Vec::with_capacity(log.len()),
+        joints: vec![JointSeries::default(); N],
+        joints_in_file: N,
+    };
+    let first = log.first().map_or(0, |logged| logged.sample.tick);
+    for logged in log {
+        let ticks = logged.sample.tick.wrapping_sub(first);
+        recording.time_s.push(f64::from(ticks) / f64::from(SERVO_RATE_HZ));
+        for (joint, series) in recording.joints.iter_mut().enumerate() {
+            let file = &leg.joints[joint];
+            let radian_per_count = file.encoder.step_rad();
+            let counts = f64::from(logged.sample.counts_sum[joint]) / f64::from(TICKS_PER_LOG);
+            let direction = if file.direction < 0 { -1.0 } else { 1.0 };
+            series.position_rad.push(leg.side.mounting() * counts * radian_per_count);
+            series.torque_nm.push(direction * f64::from(logged.sample.torque_nm[joint]));
+        }
+    }
+    recording
 }
 
 /// Leg after one identification, with its observation.

@@ -5,6 +5,7 @@ use super::control::{Axis, DAMPING_UNIT, STIFFNESS_UNIT, Settings};
 use crate::bus::abort::Abort;
 use crate::bus::dictionary::Object;
 use crate::bus::objects::{Lost, Objects};
+use crate::bus::table::is_of_leg;
 
 /// Low bytes of a signed number.
 macro_rules! bits {
@@ -64,7 +65,7 @@ impl Objects for Axis {
             (0x2021, 6) => u32::from(constants.current_bandwidth_limits()[1]),
             // Objects of the leg; they are not held here.
             (0x2120, 0) => 13,
-            (0x2100..=0x2193, _) => return Err(Abort::NoData),
+            (index, _) if is_of_leg(index) => return Err(Abort::NoData),
             (0x219A | 0x60FD, _) => status.inputs,
             (0x6007, _) => bits!(settings.connection_option),
             (0x6040, _) => u32::from(self.controlword),
@@ -133,7 +134,7 @@ impl Objects for Axis {
         let is = |allowed: &[i32]| allowed.contains(&i32::from(value as i16));
         match (object.index, object.sub) {
             (0x2120, 0) => {}
-            (0x2100..=0x2193, _) => return Err(Abort::State),
+            (index, _) if is_of_leg(index) => return Err(Abort::State),
             // 0: the default node-ID of the board.
             (0x2001, _) if value <= 127 => settings.node_id = value as u8,
             (0x2002, _) if matches!(value, 125 | 250 | 500 | 1000) => settings.bit_rate = value as u16,

@@ -1,5 +1,5 @@
 use super::super::dictionary::{Access, Type};
-use super::super::table::ROWS;
+use super::super::table::{ROWS, is_of_leg};
 use super::*;
 use crate::leg::{FoundBase, FoundFit, FoundParameter, LoggedSample, Segment, Verdict};
 
@@ -66,7 +66,7 @@ fn with<R: Results, T>(
 #[test]
 fn every_object_of_the_table_is_answered_with_and_without_a_result() {
     for results in [Numbers(None), ACCEPTED] {
-        for row in ROWS.iter().filter(|row| (0x2100..0x219A).contains(&row.index)) {
+        for row in ROWS.iter().filter(|row| is_of_leg(row.index)) {
             for sub in (row.sub..row.sub + row.subs).filter(|_| row.access != Access::Const) {
                 let object = Object::at(row.index, sub);
                 let read = with(&mut leg(), &results, |objects| match row.kind {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::bus::dictionary::{Access, Object, Type};
+use crate::bus::table::is_of_leg;
 
 fn objects() -> impl Iterator<Item = (Object, &'static dictionary::Row)> {
     table::ROWS.iter().flat_map(|row| {
@@ -23,7 +24,7 @@ fn is_live(object: Object) -> bool {
 
 /// Object of the leg or the board, which a joint alone does not have; see `identification::tests`.
 fn is_of_the_leg(object: Object) -> bool {
-    matches!(object.index, 0x1F50..0x1F58 | 0x2100..0x219A) && object.sub > 0
+    (matches!(object.index, 0x1F50..0x1F58) || is_of_leg(object.index)) && object.sub > 0
 }
 
 #[test]

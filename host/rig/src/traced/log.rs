@@ -8,7 +8,7 @@ use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::with_leg_size;
 
-use crate::identify::recorded;
+use crate::simulate::recorded;
 use crate::trace::read::Trace;
 use crate::trace::records::Log;
 
