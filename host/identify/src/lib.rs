@@ -1,16 +1,15 @@
 //! From files of a leg and its recordings to a result.
 //!
-//! | module | contents |
+//! | step | items |
 //! | --- | --- |
-//! | [`report`] | results as plain data: the JSON |
-//! | [`formats`] | files: leg, model, motion, recording, URDF |
-//! | [`leg`] | a leg file becomes the firmware's configuration, its prior and its plant |
-//! | [`run`] | from a recording to parameters, verdict and prediction |
+//! | describe the leg | [`LegFile`]; from a URDF [`Robot`] and [`leg_of_robot`] |
+//! | read recordings | [`Recording`], with other columns and units by [`Import`] |
+//! | identify and judge | [`replay`]; while samples arrive [`progress`] |
+//! | use the result | [`RunReport`], [`ModelFile`], [`predict`], [`compare_models`], [`urdf`] |
+//! | other tables | [`regressor_table`], [`Excitation`] and [`MotionSamples`] |
 //!
 //! ```no_run
-//! use scarab_identify::formats::leg_file::LegFile;
-//! use scarab_identify::formats::recording::{Recording, import::Import};
-//! use scarab_identify::run::replay::{Recordings, ReplayOptions, replay};
+//! use scarab_identify::{Import, LegFile, Recording, Recordings, ReplayOptions, replay};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let leg = &LegFile::load("my-leg.toml")?;
@@ -26,14 +25,43 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Angles and torques outside are anatomical, in rad and N m: flexion positive. The hidden modules belong to
+//! the other crates of this workspace and may change at any time.
 
-#![expect(missing_docs, reason = "part of a program: names and units are stated where they are not obvious")]
 #![expect(
     clippy::disallowed_methods,
     reason = "the tool runs on the host only and may use std's mathematics"
 )]
 
+#[doc(hidden)]
 pub mod formats;
+#[doc(hidden)]
 pub mod leg;
+#[doc(hidden)]
 pub mod report;
+#[doc(hidden)]
 pub mod run;
+
+pub use formats::excitation::Excitation;
+pub use formats::leg_file::{JointFile, LegFile};
+pub use formats::model_file::ModelFile;
+pub use formats::motion_samples::MotionSamples;
+pub use formats::recording::import::{ColumnChoice, Import, UnitChoice};
+pub use formats::recording::{JointSeries, Read, Recording};
+pub use formats::robot::Robot;
+pub use formats::urdf::text as urdf;
+pub use leg::from_robot::{FromRobot, RobotOptions, leg as leg_of_robot};
+pub use leg::placed_mass::PlacedMass;
+pub use leg::setup::PriorChoice;
+pub use leg::states::Angles;
+pub use report::doubt::{CauseReport, DoubtReport};
+pub use report::findings::FindingReport;
+pub use report::{BaseReport, ComparisonReport, FitReport, ParameterReport, RunReport, Source};
+pub use run::compare_model::compare as compare_models;
+pub use run::predict::table as predict;
+pub use run::progress::{LoggedMotion, PredictedRow, Progress, ProgressOptions, progress};
+pub use run::regressor::{RegressorOptions, table as regressor_table};
+pub use run::replay::{Recordings, ReplayOptions, Replayed, replay};
+pub use scarab_base::error::{FileError, ToolError};
+pub use scarab_base::number::Number;

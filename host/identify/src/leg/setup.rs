@@ -66,6 +66,7 @@ impl core::str::FromStr for PriorChoice {
 /// for any axes.
 ///
 /// Runs `$body` with the constants `N` (joints) and `B` (capacity for base parameters).
+#[doc(hidden)]
 #[macro_export]
 macro_rules! with_leg_size {
     ($leg:expr, $body:ident ( $($argument:expr),* )) => {
