@@ -3,8 +3,11 @@
 //! linked once.
 
 mod board_registers;
+mod bus;
 mod complete_drive;
+mod floor;
 mod held_out;
+mod holding_brake;
 mod identification;
 mod model_reference;
 mod planar_leg;

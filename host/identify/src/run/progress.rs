@@ -17,7 +17,7 @@ use crate::formats::leg_file::LegFile;
 use crate::leg::background::Background;
 use crate::leg::setup::{PriorChoice, background};
 use crate::report::BaseReport;
-use crate::run::replay::{PENDING, TAPS};
+use crate::run::resample::{PENDING, TAPS};
 use crate::with_leg_size;
 
 /// Rows between two estimates: one second.

@@ -32,12 +32,12 @@ use crate::report::series::{Reader, Role, Series};
 use crate::report::{RunReport, Source};
 use crate::run::analysis::{Circumstances, Motion};
 use crate::run::logging_errors::encoder::Encoders;
+use crate::run::resample::{PENDING, TAPS};
 use crate::with_leg_size;
 use judge::{Judged, judge};
 use logging_errors::{Subject, chosen_bandwidth, encoders, noise_density};
 use predictions::write_predictions;
 use read::{Parts, parts};
-pub(crate) use rows::{PENDING, TAPS};
 use rows::{Samples, bandwidth_error, new_recorder};
 use solve::{Solved, solve};
 

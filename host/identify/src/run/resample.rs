@@ -35,6 +35,10 @@ use scarab::ident::SAMPLE_RATE_HZ;
 
 /// Rate of the grid, Hz: that of the firmware's filter chain.
 pub const GRID_RATE_HZ: f64 = SAMPLE_RATE_HZ;
+/// Reserved taps of the filters on the grid: bandwidths from 1 Hz.
+pub(crate) const TAPS: usize = 2048;
+/// Open outputs of such a filter.
+pub(crate) const PENDING: usize = 205;
 /// Share of the grid's period below which the median step leads to averaging, above it to interpolation.
 pub(crate) const DENSE_STEP: f64 = 0.9;
 /// Share of a recording's own rate up to which its resampled motion can be trusted.

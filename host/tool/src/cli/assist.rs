@@ -18,7 +18,8 @@ use scarab_rig::faults::run::{Blind, Manner};
 use crate::cli::arguments::{Choice, OutputFolder, one_of};
 use crate::cli::common::write_json;
 use crate::cli::leg_options::LegOptions;
-use crate::view::html::{self, Circumstances};
+use crate::view::html::Circumstances;
+use crate::view::sections;
 use crate::view::{assist as text, figures};
 
 /// Walking at several strides per second.
@@ -172,12 +173,17 @@ pub(crate) fn run(arguments: &AssistArguments) -> Result<u8, ToolError> {
         let [missed, faults] = inject(&leg, &options, arguments.fault_runs)?;
         (report.missed, report.faults) = (Some(missed), faults);
     }
-    output::print(&text::text(&report))?;
+    output::print(&format!(
+        "{}: {}\n\n{}",
+        report.leg,
+        text::seeds(&report),
+        sections::text(&text::sections(&report, &[]))
+    ))?;
     if let Some(directory) = &arguments.out {
         let drawn = figures::assist::all(&report)?;
         figures::write(directory, &drawn)?;
         write_json(&directory.join("assist.json"), &report)?;
-        let page = html::assist::page(&Circumstances::now(&leg), &report, &drawn);
+        let page = text::page(&Circumstances::now(&leg), &report, &drawn);
         files::write(&directory.join("assist.html"), page)?;
         output::print(&format!("\nreport: {}\n", directory.join("assist.html").display()))?;
     }

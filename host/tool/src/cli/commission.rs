@@ -8,7 +8,7 @@ use scarab_client::commission::{Commission, CommissionOptions, Step};
 use crate::cli::adapter::AdapterOptions;
 use crate::cli::arguments::OutputFolder;
 use crate::cli::common::write_json;
-use crate::view::html;
+use crate::view;
 
 /// Bus, nodes and steps.
 #[derive(Args, Debug)]
@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &CommissionArguments) -> Result<u8, ToolError> {
     let (report, result) = Commission::new(client, options, &mut say).run();
     if let Some(directory) = &arguments.out {
         write_json(&directory.join("commission.json"), &report)?;
-        files::write(&directory.join("commission.html"), html::commission::page(&report))?;
+        files::write(&directory.join("commission.html"), view::commission::page(&report))?;
         output::print(&format!("report: {}\n", directory.join("commission.html").display()))?;
     }
     match result {

@@ -23,7 +23,8 @@ use crate::cli::arguments::{Output, Updated};
 
 use crate::cli::common::{program, write_json};
 use crate::cli::leg_options::LegOptions;
-use crate::view::html::{self, Circumstances};
+use crate::view::html::Circumstances;
+use crate::view::sections::{self, Head, Section};
 use crate::view::{document, figures};
 
 /// Kind and name of the table's markers in a document.
@@ -120,14 +121,22 @@ fn page(whole: &CampaignHeader, report: &CampaignReport, found: &Campaign) -> Re
             figures::faults::drawn(format!("{}-{}.svg", outcome.fault, outcome.seed), &what, recording)
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let campaign = html::faults::Campaign {
-        verdict: if report.is_good() { "nothing missed" } else { "failures" },
-        table: &report.table(),
-        notes: &report.notes(),
-        runs: &lines,
-        figures: &figures,
+    let circumstances = Circumstances::from_command(leg, whole.command_line());
+    let verdict = if report.is_good() { "nothing missed" } else { "failures" };
+    let head = Head {
+        kind: "fault campaign",
+        title: &format!("{}: {verdict}", leg.name),
+        time_utc: &circumstances.time_utc,
+        lines: core::slice::from_ref(&circumstances.command),
     };
-    Ok(html::faults::page(&Circumstances::from_command(leg, whole.command_line()), &campaign))
+    let mut sections = vec![
+        Section::new("Rows of the catalogue").table(report.table()),
+        Section::new("Notes").lines(report.notes().lines().map(str::to_owned)),
+    ];
+    if !lines.is_empty() {
+        sections.push(Section::new("Runs").lines(lines).figures(&figures));
+    }
+    Ok(sections::page(head, &sections))
 }
 
 /// Defaults of the full campaign.

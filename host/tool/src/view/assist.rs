@@ -1,8 +1,28 @@
-//! Tables of compensation and assistance, for the terminal and the page.
+//! Sections of compensation and assistance.
 
 use scarab_base::number::Number;
 use scarab_base::table::{Table, cells};
 use scarab_rig::report::assist::{AssistReport, PeriodicReport};
+
+use crate::view::figures::{Figure, Group};
+use crate::view::html::Circumstances;
+use crate::view::sections::{self, Head, Section};
+
+const TORQUES: &str = "Interaction torque is what the cuffs exert on the exoskeleton's joints, measured in the \
+    simulation. All columns have the same motion of the wearer's leg. N m rms over all seeds.";
+const PERIODIC_MOTION: &str = "The oscillators are locked while their phase errs by less than 5 % of a cycle. Effort is \
+    the rms torque of both muscles in a cycle, without the three cycles in which they may \
+    lock. Energy counts from the second cycle after a walking wearer is limp or resists. \
+    The worst of all seeds, the mean for the effort.";
+const WEARER_SUMS: &str = "Difference of the models `worn` and `empty`. Torque determines these sums; a mass needs \
+    an assumption besides.";
+/// Sentences about stability, up to the share of compensated friction.
+const STABILITY: &str = "Share of the exoskeleton's inertia below which small vibrations on the cuffs decay. The \
+    acceleration is known late, which feeds slow vibrations; its lead feeds fast ones. \
+    The cuffs' damping takes the energy away. Largest share over five knee angles from 10 to 90 degrees, with ";
+const LIMITS: &str = "Simulated legs and wearers, off the ground: swinging, seated or hanging. No force is measured \
+    at the cuffs. No person may wear the leg; on hardware every mode is to be tried with a dummy leg \
+    (docs/assist.md).";
 
 /// Torque with two decimals, or a dash.
 fn torque(value: Number) -> String {
@@ -22,7 +42,7 @@ fn percent(part: Number, whole: Number) -> String {
 }
 
 /// Torques of every mode, motion and joint, N m rms.
-pub(crate) fn rows(report: &AssistReport) -> Table {
+fn rows(report: &AssistReport) -> Table {
     let is_compared = report.rows.iter().any(|row| row.drives_off_rms_nm.known().is_some());
     let is_carried = report.rows.iter().any(|row| row.wearer_gravity_share.known().is_some());
     let mut table = Table::default()
@@ -62,7 +82,7 @@ pub(crate) fn rows(report: &AssistReport) -> Table {
 }
 
 /// Requested shares of each mode.
-pub fn shares(report: &AssistReport) -> Table {
+fn shares(report: &AssistReport) -> Table {
     let mut table = Table::default().label("mode").numbers(["friction", "inertia", "weight", "periodic"]);
     for shares in &report.shares {
         let [friction, inertia, weight, periodic] =
@@ -74,7 +94,7 @@ pub fn shares(report: &AssistReport) -> Table {
 }
 
 /// Periodic assistance: the worst of all seeds for each cadence, the mean for the effort.
-pub(crate) fn periodic(report: &AssistReport) -> Table {
+fn periodic(report: &AssistReport) -> Table {
     let mut table = Table::default().label("cadence, Hz").numbers([
         "lock, cycles",
         "relock, cycles",
@@ -106,7 +126,7 @@ pub(crate) fn periodic(report: &AssistReport) -> Table {
 }
 
 /// Base sums of the wearer's leg against anthropometry.
-pub(crate) fn wearer_sums(report: &AssistReport) -> Table {
+fn wearer_sums(report: &AssistReport) -> Table {
     let is_spread = report.wearer_sums.iter().any(|sum| sum.spread.known().is_some());
     let mut table = Table::default()
         .label("worn - empty")
@@ -135,7 +155,7 @@ pub(crate) fn wearer_sums(report: &AssistReport) -> Table {
 }
 
 /// Lines about energy, rest, faults and stability; only what was run.
-pub(crate) fn notes(report: &AssistReport) -> Vec<String> {
+fn notes(report: &AssistReport) -> Vec<String> {
     let mut notes: Vec<String> =
         report.failures().into_iter().map(|failure| format!("FAILED: {failure}")).collect();
     for refused in &report.refused {
@@ -175,23 +195,57 @@ pub(crate) fn notes(report: &AssistReport) -> Vec<String> {
     notes
 }
 
-/// Everything for the terminal.
-pub fn text(report: &AssistReport) -> String {
-    let [first, last] = report.seeds;
-    let seeds = if first == last { format!("seed {first}") } else { format!("seeds {first} to {last}") };
-    let mut text = format!("{}: {seeds}\n\nshares\n{}", report.leg, shares(report).to_text());
+/// All sections, with the figures that were drawn.
+pub(crate) fn sections(report: &AssistReport, figures: &[Figure]) -> Vec<Section> {
+    let of = |groups: &'static [Group]| figures.iter().filter(|figure| groups.contains(&figure.group));
+    let friction = 100.0 * report.stability.friction_share;
+    let stability = format!("{STABILITY}{friction:.0} % of viscous friction compensated.");
+    let mut sections =
+        vec![Section::new("Shares").explained("Shares of the models' torques.").table(shares(report))];
     if !report.rows.is_empty() {
-        text += &format!("\ntorques of hip and knee, N m rms\n{}", rows(report).to_text());
+        let figures = of(&[Group::Summary, Group::Torque]);
+        sections.push(
+            Section::new("Torques of hip and knee, N m rms")
+                .explained(TORQUES)
+                .table(rows(report))
+                .figures(figures),
+        );
     }
     if !report.periodic.is_empty() {
-        text += &format!("\nassistance of a periodic motion\n{}", periodic(report).to_text());
+        sections.push(
+            Section::new("Assistance of a periodic motion")
+                .explained(PERIODIC_MOTION)
+                .table(periodic(report)),
+        );
     }
     if !report.wearer_sums.is_empty() {
-        text += &format!("\nthe wearer's leg from both models\n{}", wearer_sums(report).to_text());
+        sections.push(
+            Section::new("The wearer's leg from both models")
+                .explained(WEARER_SUMS)
+                .table(wearer_sums(report)),
+        );
     }
-    text.push('\n');
-    for note in notes(report) {
-        text += &format!("{note}\n");
-    }
-    text
+    sections.push(Section::new("Stability").explained(stability).figures(of(&[Group::Search])));
+    sections.push(Section::new("Results").lines(notes(report)));
+    sections.push(Section::new("Limits of these results").explained(LIMITS));
+    sections
+}
+
+/// Seeds in words.
+pub(crate) fn seeds(report: &AssistReport) -> String {
+    let [first, last] = report.seeds;
+    if first == last { format!("seed {first}") } else { format!("seeds {first} to {last}") }
+}
+
+/// Page of all sections.
+pub(crate) fn page(circumstances: &Circumstances, report: &AssistReport, figures: &[Figure]) -> String {
+    let failures = report.failures();
+    let verdict = if failures.is_empty() { "no limit exceeded".to_owned() } else { failures.join(", ") };
+    let head = Head {
+        kind: "assistance",
+        title: &format!("{}: {verdict}", report.leg),
+        time_utc: &circumstances.time_utc,
+        lines: &[circumstances.command.clone(), seeds(report)],
+    };
+    sections::page(head, &sections(report, figures))
 }

@@ -8,10 +8,7 @@
 //! Keys without a section of their own, for example from a later report, are shown in a generic
 //! table (`html/generic.rs`).
 
-pub(crate) mod assist;
 mod choices;
-pub(crate) mod commission;
-pub(crate) mod faults;
 mod generic;
 mod head;
 mod limits;
@@ -128,7 +125,7 @@ pub fn page(
 }
 
 /// Drawing with a title for screen readers.
-fn drawing(figure: &Figure) -> Markup {
+pub(crate) fn drawing(figure: &Figure) -> Markup {
     let svg = figure.svg.replacen("<svg ", "<svg role=\"img\" aria-labelledby=\"", 1);
     let identity = figure.file.replace('.', "-");
     let svg = svg.replacen("aria-labelledby=\"", &format!("aria-labelledby=\"{identity}\" "), 1);
@@ -177,7 +174,7 @@ fn count(number: usize, thing: &str) -> String {
 }
 
 /// Head of every page: no network, no script.
-fn page_head(title: &str) -> Markup {
+pub(crate) fn page_head(title: &str) -> Markup {
     html! {
         head {
             meta charset="utf-8";

@@ -1,6 +1,7 @@
 //! Results as tables, figures and pages. Runs nothing.
 
 pub(crate) mod assist;
+pub(crate) mod commission;
 pub mod document;
 pub(crate) mod excite;
 pub mod figures;
@@ -9,5 +10,6 @@ pub mod live;
 pub(crate) mod monitor;
 pub(crate) mod motor;
 pub(crate) mod runs;
+pub(crate) mod sections;
 pub(crate) mod spread;
 pub mod tables;

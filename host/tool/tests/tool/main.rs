@@ -1,7 +1,6 @@
 //! Tests of the tool: its commands with their output, files and rejections, and its formats. One program, so
 //! helpers are shared and the tool is linked once.
 
-mod bus;
 mod chain;
 mod command;
 mod eds;
@@ -10,9 +9,7 @@ mod excite_samples;
 mod faults;
 mod figures;
 mod files;
-mod floor;
 mod fuzz;
-mod holding_brake;
 mod image;
 mod image_source;
 mod imports;

@@ -159,6 +159,12 @@ fn unnamed_parts_stay_and_calibrations_of_different_age_are_not_mixed() {
 
 #[test]
 fn a_board_uses_an_imported_flash_but_refuses_another_leg_s_model() {
+    // Boards are moved over the stack, whose frames are large without optimisation.
+    let test = std::thread::Builder::new().stack_size(64 << 20).spawn(board_with_imported_flash);
+    test.expect("a thread").join().expect("the test passes");
+}
+
+fn board_with_imported_flash() {
     let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
     let start = |text: &str| {
         let folder = Folder::new();

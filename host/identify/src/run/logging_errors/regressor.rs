@@ -10,7 +10,7 @@ use scarab::ident::{
 use scarab::model::Parameter;
 
 use crate::run::logging_errors::table::Table;
-use crate::run::replay::{PENDING, TAPS};
+use crate::run::resample::{PENDING, TAPS};
 
 /// Smoothed motion of all joints at one instant.
 #[derive(Clone, Debug, PartialEq)]

@@ -20,7 +20,7 @@ use scarab_base::stats::{quantile, rms};
 use crate::run::logging_errors::fit::{Fit, Score, score, segment_sigma, solve};
 use crate::run::logging_errors::regressor::{Filtered, Instant, Regressor};
 use crate::run::logging_errors::table::Table;
-use crate::run::replay::TAPS;
+use crate::run::resample::TAPS;
 
 /// Rows of a block with a common weight.
 const BLOCK_ROWS: usize = 16;

@@ -5,12 +5,13 @@ use scarab::real::dot;
 
 use super::logging_errors::sample_noise;
 use super::predictions::Prediction;
-use super::rows::{PENDING, Samples, feed};
+use super::rows::{Samples, feed};
 use super::screening::Continuity;
 use super::solve::Solved;
 use crate::leg::background::Background;
 use crate::report::Source;
 use crate::report::findings::FindingReport;
+use crate::run::resample::PENDING;
 
 /// Largest held-out error over the training error where noise does not explain the latter.
 const LARGEST_ERROR_RATIO: f32 = 2.0;

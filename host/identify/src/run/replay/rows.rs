@@ -13,12 +13,8 @@ use super::screening::Screening;
 use crate::formats::recording::Recording;
 use crate::leg::background::Background;
 use crate::report::Source;
-use crate::run::resample::Resampled;
+use crate::run::resample::{PENDING, Resampled, TAPS};
 
-/// Reserved filter taps: bandwidths from 1 Hz.
-pub(crate) const TAPS: usize = 2048;
-/// Open outputs of that filter.
-pub(crate) const PENDING: usize = 205;
 /// Sample time of the firmware, s.
 pub(super) const GRID_S: f64 = 1.0 / SAMPLE_RATE_HZ;
 /// Above this bandwidth, 50 Hz rows alias the noise that the low-pass passes, and sigma becomes too small.

@@ -1,13 +1,17 @@
-//! Page of a commissioning.
+//! Sections of a commissioning.
 
-use maud::{DOCTYPE, html};
 use scarab_base::number::Number;
 use scarab_base::precision;
 use scarab_base::table::{Table, cells};
 use scarab_client::report::{CommissionReport, ParameterRead};
 
-use crate::view::html::table::ToHtml;
-use crate::view::html::{page_head, parameters, time_utc};
+use crate::view::html::time_utc;
+use crate::view::sections::{self, Head, Section};
+
+const BASE: &str = "SI units, as in the leg file. What torque determines: single parameters, and sums of grouped ones, named after one of \
+    them.";
+const STATUSES: &str = "identified: measured alone; grouped: only sums with the parameters beside it are measured, and the prior splits them; \
+    weak: measured, hardly distinguishable from others; prior: does not show in the torque.";
 
 /// Value with some decimal places, or a dash. A number that rounds to zero has no sign.
 fn places(value: Number, count: usize) -> String {
@@ -67,45 +71,29 @@ pub(crate) fn page(report: &CommissionReport) -> String {
     for step in &report.steps {
         steps.row(cells![step.step, format!("{:.1}", step.seconds), &step.result]);
     }
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            (page_head(&format!("Commissioning of {:08X}: {verdict}", report.serial)))
-            body {
-                main {
-                    header {
-                        p.over { "Scarab \u{b7} commissioning" }
-                        h1 { (report.device) " " (format!("{:08X}", report.serial)) ": " (verdict) }
-                        p.when { (time_utc()) " (UTC)" }
-                        p {
-                            "Firmware " (report.firmware)
-                            @if report.image != 0 { ", image with check sum " (format!("{:08X}", report.image)) }
-                            ", supply " (places(report.supply_v, 1)) " V"
-                        }
-                    }
-                    section { h2 { "Steps" } (steps.to_html()) }
-                    section { h2 { "Joints" } (joints(report).to_html()) }
-                    @if report.verdict.is_some() {
-                        section {
-                            h2 { "Base parameters" }
-                            p { "SI units, as in the leg file. What torque determines: single parameters, and sums of grouped ones, named after one of them." }
-                            (table(&report.base).to_html())
-                        }
-                        section {
-                            h2 { "All parameters" }
-                            (parameters::statuses(true))
-                            @for (name, joint) in ["hip", "knee"].into_iter().zip(&report.joints) {
-                                h3 { "Parameters of the " (name) }
-                                (table(&joint.parameters).to_html())
-                            }
-                        }
-                        @if !report.reasons.is_empty() { p { "Refused because of: " (report.reasons.join(", ")) } }
-                    }
-                }
-            }
+    let mut sections = vec![Section::new("Steps").table(steps), Section::new("Joints").table(joints(report))];
+    if report.verdict.is_some() {
+        sections.push(Section::new("Base parameters").explained(BASE).table(table(&report.base)));
+        for (name, joint) in ["hip", "knee"].into_iter().zip(&report.joints) {
+            let section = Section::new(format!("Parameters of the {name}"));
+            sections.push(section.explained(STATUSES).table(table(&joint.parameters)));
         }
+    }
+    if !report.reasons.is_empty() {
+        sections.push(Section::new("Refused because of").lines([report.reasons.join(", ")]));
+    }
+    let image = match report.image {
+        0 => String::new(),
+        sum => format!(", image with check sum {sum:08X}"),
     };
-    page.into_string()
+    let firmware = format!("Firmware {}{image}, supply {} V", report.firmware, places(report.supply_v, 1));
+    let head = Head {
+        kind: "commissioning",
+        title: &format!("{} {:08X}: {verdict}", report.device, report.serial),
+        time_utc: &time_utc(),
+        lines: &[firmware],
+    };
+    sections::page(head, &sections)
 }
 
 #[cfg(test)]
