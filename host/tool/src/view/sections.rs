@@ -53,7 +53,8 @@ pub(crate) fn text(sections: &[Section]) -> String {
     let shown = sections.iter().filter(|section| !section.table.is_empty() || !section.lines.is_empty());
     let section = |section: &Section| {
         let lines: String = section.lines.iter().map(|line| format!("{line}\n")).collect();
-        format!("{}\n{}{lines}", section.title, section.table.to_text())
+        let table = if section.table.is_empty() { String::new() } else { section.table.to_text() };
+        format!("{}\n{table}{lines}", section.title)
     };
     shown.map(section).collect::<Vec<_>>().join("\n")
 }
