@@ -197,7 +197,7 @@ pub fn run(plant: &LegFile, believed: &LegFile, options: &ChainOptions) -> Resul
     (context.motions.excitation, context.configuration.excitation) = (excitation, excitation);
     let verifying = verification::motion(believed)?;
     (context.motions.validation[0], context.configuration.validation[0]) = (verifying, verifying);
-    let Driven { pair, mut watch, stopped, .. } = drive(believed, plant, &context, &simulation, &mut ())?;
+    let Driven { pair, watch, stopped, .. } = drive(believed, plant, &context, &simulation, &mut ())?;
     let identification = pair.leg.identification();
     let found = identification.solver().zip(identification.validation().first().cloned().flatten());
     let Some((solver, measured)) = found.filter(|_| stopped.is_none()) else {
@@ -211,7 +211,7 @@ pub fn run(plant: &LegFile, believed: &LegFile, options: &ChainOptions) -> Resul
     let noise_free = watch.noise_free(0).to_vec();
     let verification = Verification { noise_free, measured, filtered_nm, samples };
     let (values, unweighted) = (solver.values(), unweighted(solver.record(), model.base.rank()));
-    let (report, series) = watch.report(&pair, &simulation, Vec::new(), None, started)?;
+    let (report, series, _) = watch.report(&pair, &simulation, Vec::new(), None, started)?;
     Ok(ChainRun {
         report,
         values,

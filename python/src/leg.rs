@@ -476,5 +476,6 @@ fn simulated(leg: &LegFile, options: &SimulationOptions) -> Result<Simulated, To
         check(leg, Path::new("motion"), motion, &[])?;
     }
     let SimulatedRun { report, recordings, series } = simulate(leg, options)?;
-    Ok(((report, series), recordings))
+    let recordings = recordings.into_iter().filter(|recording| !recording.time_s.is_empty());
+    Ok(((report, series), recordings.collect()))
 }

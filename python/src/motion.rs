@@ -7,7 +7,7 @@ use scarab_base::files;
 use scarab_identify::formats::excitation::Excitation;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::formats::motion_samples::{MotionSamples, SampleRate};
-use scarab_rig::excite::run::{Excited, check};
+use scarab_rig::excite::run::{Excited, check_known};
 
 use crate::arrays::{object, shaped, vector};
 use crate::error::{argument, raised};
@@ -43,7 +43,7 @@ impl Motion {
     #[staticmethod]
     fn load(path: PathBuf, leg: &Leg) -> PyResult<Self> {
         let (leg, excitation) = (&leg.file, Excitation::load(&path).map_err(raised)?);
-        check(leg, &path, &excitation, &[]).map_err(raised)?;
+        check_known(leg, &path, &excitation).map_err(raised)?;
         Ok(Self { leg: leg.clone(), excitation, report: None })
     }
 

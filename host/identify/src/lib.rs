@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | describe the leg | [`LegFile`]; from a URDF [`Robot`] and [`leg_of_robot`] |
 //! | read recordings | [`Recording`], with other columns and units by [`Import`] |
-//! | identify and judge | [`replay`]; while samples arrive [`progress`] |
+//! | identify and judge | [`replay`] |
 //! | use the result | [`RunReport`], [`ModelFile`], [`predict`], [`compare_models`], [`urdf`] |
 //! | other tables | [`regressor_table`], [`Excitation`] and [`MotionSamples`] |
 //!
@@ -45,7 +45,7 @@ pub mod run;
 
 pub use formats::excitation::Excitation;
 pub use formats::leg_file::{JointFile, LegFile};
-pub use formats::model_file::ModelFile;
+pub use formats::model_file::{BaseSet, ModelFile};
 pub use formats::motion_samples::MotionSamples;
 pub use formats::recording::import::{ColumnChoice, Import, UnitChoice};
 pub use formats::recording::{JointSeries, Read, Recording};
@@ -57,11 +57,13 @@ pub use leg::setup::PriorChoice;
 pub use leg::states::Angles;
 pub use report::doubt::{CauseReport, DoubtReport};
 pub use report::findings::FindingReport;
+pub use report::series::Series;
 pub use report::{BaseReport, ComparisonReport, FitReport, ParameterReport, RunReport, Source};
 pub use run::compare_model::compare as compare_models;
 pub use run::predict::table as predict;
-pub use run::progress::{LoggedMotion, PredictedRow, Progress, ProgressOptions, progress};
 pub use run::regressor::{RegressorOptions, table as regressor_table};
 pub use run::replay::{Recordings, ReplayOptions, Replayed, replay};
+pub use scarab::ident::{Estimator, Plan};
+pub use scarab::model::Payload;
 pub use scarab_base::error::{FileError, ToolError};
 pub use scarab_base::number::Number;

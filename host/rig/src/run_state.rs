@@ -6,13 +6,13 @@ use scarab_base::names::VALIDATION_NAMES;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::BaseReport;
 use scarab_identify::report::findings::FindingReport;
-use scarab_identify::run::progress::LoggedMotion;
+use scarab_identify::run::progress::ChainSample;
 
 use crate::pair::{Context, Pair};
 
-/// Result of a search.
+/// Estimate of a search.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct SearchEstimate {
     /// Iterations of the search.
     pub iterations: u32,
     /// Reports of the base parameters.
@@ -35,20 +35,18 @@ pub trait RunState {
     fn limit_codes(&self) -> Vec<LimitCodes>;
     /// Commanded chain angles, rad.
     fn commanded_rad(&self) -> &[f32];
-    /// Sample that was logged in this tick, with its tick.
-    fn logged(&self) -> Option<(u32, LoggedMotion)>;
+    /// Newest logged sample in the output, with its tick.
+    fn logged(&self) -> Option<(u32, ChainSample)>;
     /// Duration of the motion that an activity runs, in ticks.
     fn motion_ticks(&self, activity: Activity) -> Option<u64>;
     /// Why the drive stopped, in words.
     fn stop_words(&self, leg: &LegFile) -> String;
-    /// The running search, where it has another number of iterations.
-    fn search(&self, iterations: u32) -> Option<Found>;
+    /// Estimate of the running search; `None` if it still has this number of iterations.
+    fn search(&self, iterations: u32) -> Option<SearchEstimate>;
     /// Result of the finished search.
-    fn result(&self) -> Option<Found>;
-    /// Number of the motions predicted so far; `None` without a result.
-    fn validated(&self) -> Option<usize>;
-    /// Tests of the verdict on the motions predicted so far.
-    fn findings(&self) -> Vec<FindingReport>;
+    fn result(&self) -> Option<SearchEstimate>;
+    /// Number of the motions predicted so far, with the tests of the verdict; `None` if it is this number.
+    fn findings(&self, motions: usize) -> Option<(usize, Vec<FindingReport>)>;
 }
 
 /// A pair after a tick.
@@ -59,8 +57,8 @@ pub(crate) struct Tick<'a, const N: usize, const B: usize> {
 }
 
 impl<const N: usize, const B: usize> Tick<'_, N, B> {
-    fn found(&self, estimate: &Estimate<f32, B>, dropped: &[bool; B], iterations: u32) -> Found {
-        Found {
+    fn found(&self, estimate: &Estimate<f32, B>, dropped: &[bool; B], iterations: u32) -> SearchEstimate {
+        SearchEstimate {
             iterations,
             base: self.context.background.base_parameters(dropped, estimate, None),
             values: estimate.values.to_vec(),
@@ -90,9 +88,9 @@ impl<const N: usize, const B: usize> RunState for Tick<'_, N, B> {
         &self.output.motion.position_rad
     }
 
-    fn logged(&self) -> Option<(u32, LoggedMotion)> {
+    fn logged(&self) -> Option<(u32, ChainSample)> {
         let logged = self.output.logged?;
-        let motion = LoggedMotion {
+        let motion = ChainSample {
             position_rad: logged.sample.position_rad.to_vec(),
             torque_nm: logged.sample.torque_nm.to_vec(),
             segment: logged.segment,
@@ -116,7 +114,7 @@ impl<const N: usize, const B: usize> RunState for Tick<'_, N, B> {
         self.pair.stop_words(leg)
     }
 
-    fn search(&self, iterations: u32) -> Option<Found> {
+    fn search(&self, iterations: u32) -> Option<SearchEstimate> {
         let solver = self.pair.leg.identification().solver();
         let solver =
             solver.filter(|solver| solver.is_selected() && solver.search().iterations() != iterations)?;
@@ -124,22 +122,21 @@ impl<const N: usize, const B: usize> RunState for Tick<'_, N, B> {
         Some(self.found(&estimate, &solver.record().selection.dropped, solver.search().iterations()))
     }
 
-    fn result(&self) -> Option<Found> {
+    fn result(&self) -> Option<SearchEstimate> {
         let solver = self.pair.leg.identification().solver()?;
         Some(self.found(&solver.estimate(), &solver.record().selection.dropped, solver.search().iterations()))
     }
 
-    fn validated(&self) -> Option<usize> {
+    fn findings(&self, motions: usize) -> Option<(usize, Vec<FindingReport>)> {
         let identification = self.pair.leg.identification();
         identification.solver()?;
-        Some(identification.validation().iter().flatten().count())
-    }
-
-    fn findings(&self) -> Vec<FindingReport> {
+        let predicted = identification.validation().iter().flatten().count();
         let mut findings = Vec::new();
-        let identification = self.pair.leg.identification();
+        if predicted == motions {
+            return None;
+        }
         identification
             .judge_with(&mut |evidence| findings.push(FindingReport::new(evidence, &VALIDATION_NAMES)));
-        findings
+        Some((predicted, findings))
     }
 }

@@ -39,15 +39,21 @@ pub struct SimulatedRun {
 
 /// Sees a run while it is simulated.
 pub trait Observer {
-    /// Begins a run; `progress` estimates from its samples.
-    fn begin(&mut self, progress: Box<dyn Progress>);
+    /// Begins a run; `progress` makes an estimator of its samples.
+    ///
+    /// # Errors
+    /// The estimator's filter does not fit.
+    fn begin(&mut self, progress: &dyn Fn() -> Result<Box<dyn Progress>, ToolError>)
+    -> Result<(), ToolError>;
     /// Sees the tick just run.
     fn tick(&mut self, run: &dyn RunState);
 }
 
 /// Sees nothing.
 impl Observer for () {
-    fn begin(&mut self, _: Box<dyn Progress>) {}
+    fn begin(&mut self, _: &dyn Fn() -> Result<Box<dyn Progress>, ToolError>) -> Result<(), ToolError> {
+        Ok(())
+    }
     fn tick(&mut self, _: &dyn RunState) {}
 }
 
@@ -82,9 +88,10 @@ fn simulate_observed_sized<const N: usize, const B: usize>(
     let mut context = Context::<N, B>::new(&perturb::believed(leg, wrong)?, options)?;
     perturb::configure(&mut context, wrong)?;
     let LegConfiguration { bandwidth_hz, estimator, plan, .. } = context.configuration;
-    observer.begin(progress::of_background(context.background.clone(), bandwidth_hz, estimator, plan)?);
+    let progress = || progress::of_background(context.background.clone(), bandwidth_hz, estimator, plan);
+    observer.begin(&progress)?;
     let Driven { pair, mut watch, stopped, shaking } = drive(leg, &simulated, &context, options, observer)?;
-    let (mut report, series) = if stopped.is_some() {
+    let (mut report, series, log) = if stopped.is_some() {
         watch.report(&pair, options, Vec::new(), stopped, started)?
     } else {
         let tracking = track(&context, &pair);
@@ -92,30 +99,35 @@ fn simulate_observed_sized<const N: usize, const B: usize>(
         watch.report(&pair, options, tracking, None, started)?
     };
     shaking.explain(&simulated, &mut report);
-    Ok(SimulatedRun { report, recordings: recordings(leg, &watch.log), series })
+    Ok(SimulatedRun { report, recordings: recordings(leg, &log), series })
 }
 
-/// Recordings of a log: the training motion, then each validation motion.
+/// Recordings of a log: the training motion, which may be empty, then each validation motion.
 fn recordings<const N: usize>(leg: &LegFile, log: &[LoggedSample<N>]) -> Vec<Recording> {
-    let segments = core::iter::once(Segment::Training).chain((0..=u8::MAX).map(Segment::Validation));
-    let of = |segment: Segment| -> Vec<LoggedSample<N>> {
-        log.iter().filter(|logged| logged.segment == Some(segment)).copied().collect()
+    let of = |segment: Segment| {
+        let samples = log.iter().filter(|logged| logged.segment == Some(segment));
+        recorded(Path::new("simulation"), leg, samples)
     };
-    let recorded = segments.map(|segment| recorded(Path::new("simulation"), leg, &of(segment)));
-    recorded.take_while(|recording| !recording.time_s.is_empty()).collect()
+    let validation = (0..=u8::MAX).map(|motion| of(Segment::Validation(motion)));
+    let validation = validation.take_while(|recording| !recording.time_s.is_empty());
+    core::iter::once(of(Segment::Training)).chain(validation).collect()
 }
 
 /// Recording of samples of a log: anatomical angles and torques. `name` stands for the file.
-pub(crate) fn recorded<const N: usize>(name: &Path, leg: &LegFile, log: &[LoggedSample<N>]) -> Recording {
+pub(crate) fn recorded<'a, const N: usize>(
+    name: &Path,
+    leg: &LegFile,
+    log: impl IntoIterator<Item = &'a LoggedSample<N>>,
+) -> Recording {
     let mut recording = Recording {
         file: name.to_owned(),
-        time_s: Vec::with_capacity(log.len()),
+        time_s: Vec::new(),
         joints: vec![JointSeries::default(); N],
         joints_in_file: N,
     };
-    let first = log.first().map_or(0, |logged| logged.sample.tick);
+    let mut first = None;
     for logged in log {
-        let ticks = logged.sample.tick.wrapping_sub(first);
+        let ticks = logged.sample.tick.wrapping_sub(*first.get_or_insert(logged.sample.tick));
         recording.time_s.push(f64::from(ticks) / f64::from(SERVO_RATE_HZ));
         for (joint, series) in recording.joints.iter_mut().enumerate() {
             let file = &leg.joints[joint];
@@ -247,4 +259,19 @@ fn tracking_error<const N: usize, const B: usize>(
         }
     }
     (count > 0).then(|| squared.map(|sum| sqrt(sum / f64::from(count)).to_degrees()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scarab_identify::formats::leg_file::DEFAULT_LEG;
+
+    #[test]
+    fn a_run_without_samples_has_an_empty_training_motion() {
+        let leg = LegFile::load(DEFAULT_LEG).expect("shipped");
+        let recordings = recordings::<2>(&leg, &[]);
+        let mut text = Vec::new();
+        recordings[0].write(&mut text).expect("memory can be written");
+        assert_eq!((recordings.len(), &text[..]), (1, &b"t_s,q1_rad,q2_rad,tau1_Nm,tau2_Nm\n"[..]));
+    }
 }

@@ -126,8 +126,7 @@ pub struct Watch<'a, const N: usize, const B: usize> {
     segment: Option<Segment>,
     training_rows: Vec<FilteredRows<f32, N, B>>,
     validation_rows: [Vec<FilteredRows<f32, N, B>>; VALIDATION_NAMES.len()],
-    /// Logged samples, in order.
-    pub(crate) log: Vec<LoggedSample<N>>,
+    log: Vec<LoggedSample<N>>,
     information: Information<N>,
     costs: Option<Costs<B>>,
     excess: Vec<(u32, f64)>,
@@ -330,15 +329,16 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         (motion("fourier", training, &self.training_rows), predicted.collect())
     }
 
-    /// Report after the verdict. If the drive `stopped` before, the result is rejected as input.
+    /// Report after the verdict, curves and logged samples. If the drive `stopped` before, the result is
+    /// rejected as input.
     pub fn report(
-        &mut self,
+        mut self,
         pair: &Pair<N, B>,
         options: &SimulationOptions,
         tracking: Vec<TrackingReport>,
         stopped: Option<String>,
         started: Instant,
-    ) -> Result<(RunReport, Series), ToolError> {
+    ) -> Result<(RunReport, Series, Vec<LoggedSample<N>>), ToolError> {
         let rows = self.chain.start();
         self.keep(rows);
         let identification = pair.leg.identification();
@@ -387,6 +387,6 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         let constants =
             self.context.configuration.joints.map(|joint| f64::from(joint.scale.torque_per_ampere.0));
         report.scale = scale.map_or_else(ScaleReport::default, |scale| ScaleReport::new(&scale, &constants));
-        Ok((report, series))
+        Ok((report, series, self.log))
     }
 }

@@ -23,9 +23,9 @@ use crate::with_leg_size;
 /// Rows between two estimates: one second.
 const ROWS_PER_ESTIMATE: u32 = SAMPLE_RATE_HZ as u32 / DECIMATION as u32;
 
-/// Logged sample of a leg, in chain angles and signs.
+/// Sample of a leg at 500 Hz, in chain angles and signs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LoggedMotion {
+pub struct ChainSample {
     /// Angle of each joint, rad.
     pub position_rad: Vec<f32>,
     /// Torque of each joint, N m.
@@ -47,8 +47,8 @@ pub struct PredictedRow {
 
 /// Recorder and newest estimate of a leg of any size.
 pub trait Progress {
-    /// Takes one sample; returns the row that it completes.
-    fn push(&mut self, sample: &LoggedMotion) -> Option<PredictedRow>;
+    /// Takes one sample; returns the row that it completes. A sample of another number of joints is ignored.
+    fn push(&mut self, sample: &ChainSample) -> Option<PredictedRow>;
     /// Separates the next sample from the last one, because samples between them are missing.
     fn break_off(&mut self);
     /// Least squares over the motion so far, each second of the motion to identify from. Predicts from then
@@ -68,8 +68,10 @@ pub trait Progress {
 /// How the samples are filtered and estimated.
 #[derive(Clone, Debug)]
 pub struct ProgressOptions {
-    /// Prior of the leg, with the seed of a wrong one.
-    pub prior: (PriorChoice, u64),
+    /// Prior of the leg.
+    pub prior: PriorChoice,
+    /// Seed of a wrong prior.
+    pub seed: u64,
     /// Frequency at which the low-pass is 3 dB down, Hz.
     pub bandwidth_hz: f64,
     /// Robust or plain.
@@ -77,18 +79,19 @@ pub struct ProgressOptions {
     /// One-time or sequential.
     pub plan: Plan,
     /// Whether the leg file's `truth` is that of the leg, and so is reported.
-    pub knows_truth: bool,
+    pub reports_truth: bool,
 }
 
 impl ProgressOptions {
     /// Robust one-time identification with the leg file's prior.
     pub fn new(bandwidth_hz: f64) -> Self {
         Self {
-            prior: (PriorChoice::Default, 0),
+            prior: PriorChoice::Default,
+            seed: 0,
             bandwidth_hz,
             estimator: Estimator::Robust,
             plan: Plan::OneTime,
-            knows_truth: true,
+            reports_truth: true,
         }
     }
 }
@@ -105,10 +108,9 @@ fn of_file<const N: usize, const B: usize>(
     leg: &LegFile,
     options: &ProgressOptions,
 ) -> Result<Box<dyn Progress>, ToolError> {
-    let (prior, seed) = options.prior;
-    let mut background = background::<N, B>(leg, prior, seed)?;
+    let mut background = background::<N, B>(leg, options.prior, options.seed)?;
     background.use_estimator(options.estimator);
-    if !options.knows_truth {
+    if !options.reports_truth {
         background.truth = None;
     }
     of_background(background, options.bandwidth_hz as f32, options.estimator, options.plan)
@@ -177,13 +179,13 @@ impl<const N: usize, const B: usize> SizedProgress<N, B> {
 }
 
 impl<const N: usize, const B: usize> Progress for SizedProgress<N, B> {
-    fn push(&mut self, sample: &LoggedMotion) -> Option<PredictedRow> {
+    fn push(&mut self, sample: &ChainSample) -> Option<PredictedRow> {
+        let position: &[f32; N] = sample.position_rad[..].try_into().ok()?;
+        let torque: &[f32; N] = sample.torque_nm[..].try_into().ok()?;
         if sample.segment != self.segment {
             self.begin(sample.segment);
         }
         sample.segment?;
-        let position: &[f32; N] = sample.position_rad[..].try_into().ok()?;
-        let torque: &[f32; N] = sample.torque_nm[..].try_into().ok()?;
         let progress = self.recorder.push(&self.model, position, torque)?;
         Some(self.predicted(&progress.rows?))
     }

@@ -173,17 +173,14 @@ pub(crate) fn run(arguments: &AssistArguments) -> Result<u8, ToolError> {
         let [missed, faults] = inject(&leg, &options, arguments.fault_runs)?;
         (report.missed, report.faults) = (Some(missed), faults);
     }
-    output::print(&format!(
-        "{}: {}\n\n{}",
-        report.leg,
-        text::seeds(&report),
-        sections::text(&text::sections(&report, &[]))
-    ))?;
+    let drawn = if arguments.out.is_some() { figures::assist::all(&report)? } else { Vec::new() };
+    let sections = text::sections(&report, &drawn);
+    let seeds = text::seeds(&report);
+    output::print(&format!("{}: {seeds}\n\n{}", report.leg, sections::text(&sections)))?;
     if let Some(directory) = &arguments.out {
-        let drawn = figures::assist::all(&report)?;
         figures::write(directory, &drawn)?;
         write_json(&directory.join("assist.json"), &report)?;
-        let page = text::page(&Circumstances::now(&leg), &report, &drawn);
+        let page = text::page(&Circumstances::now(&leg), &report, &sections);
         files::write(&directory.join("assist.html"), page)?;
         output::print(&format!("\nreport: {}\n", directory.join("assist.html").display()))?;
     }

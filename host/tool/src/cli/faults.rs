@@ -127,7 +127,8 @@ fn page(whole: &CampaignHeader, report: &CampaignReport, found: &Campaign) -> Re
         kind: "fault campaign",
         title: &format!("{}: {verdict}", leg.name),
         time_utc: &circumstances.time_utc,
-        lines: core::slice::from_ref(&circumstances.command),
+        command: Some(&circumstances.command),
+        lines: &[],
     };
     let mut sections = vec![
         Section::new("Rows of the catalogue").table(report.table()),

@@ -7,7 +7,7 @@ use scarab_identify::formats::leg_file::geometry::anatomical_joints;
 use scarab_identify::formats::leg_file::{JointFile, LegFile};
 use scarab_identify::leg::stick::Stick;
 use scarab_identify::report::{BaseReport, RunReport};
-use scarab_identify::run::progress::{LoggedMotion, PredictedRow, Progress};
+use scarab_identify::run::progress::{ChainSample, PredictedRow, Progress};
 
 use crate::live::report::{
     EstimateOrigin, JointScene, LegScene, LiveEstimate, LiveNote, LiveOutcome, LiveParameter, LiveRow,
@@ -124,7 +124,7 @@ impl<'a> Picture<'a> {
     /// Adds a logged sample to the means and to the progress of the identification. In the motion to identify
     /// from, least squares over the motion so far are reported each second. A torque that is not a number is
     /// unknown.
-    pub(crate) fn learn(&mut self, logged: &LoggedMotion, progress: &mut dyn Progress) {
+    pub(crate) fn learn(&mut self, logged: &ChainSample, progress: &mut dyn Progress) {
         self.log(logged);
         if !logged.torque_nm.iter().all(|torque| torque.is_finite()) {
             progress.break_off();
@@ -138,7 +138,7 @@ impl<'a> Picture<'a> {
     }
 
     /// Adds a logged sample to the means; the last one of a period ends it.
-    fn log(&mut self, logged: &LoggedMotion) {
+    fn log(&mut self, logged: &ChainSample) {
         let sums = &mut self.sums;
         sums.logged += 1;
         for joint in 0..self.anatomy.len() {

@@ -11,7 +11,7 @@ use scarab_base::error::ToolError;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::formats::recording::Recording;
 use scarab_identify::report::RunReport;
-use scarab_identify::run::progress::{LoggedMotion, Progress, ProgressOptions, progress};
+use scarab_identify::run::progress::{ChainSample, Progress, ProgressOptions, progress};
 use scarab_identify::run::replay::{Recordings, ReplayOptions, replay};
 use scarab_identify::run::resample::Resampled;
 
@@ -41,11 +41,12 @@ pub(crate) fn play(
     let progress = progress(
         leg,
         &ProgressOptions {
-            prior: (options.prior, options.swarm_seed),
+            prior: options.prior,
+            seed: options.swarm_seed,
             bandwidth_hz: options.bandwidth_hz,
             estimator: options.estimator,
             plan: options.plan,
-            knows_truth: true,
+            reports_truth: true,
         },
     )?;
     let name = recording.file.file_name().unwrap_or_default().display();
@@ -88,7 +89,7 @@ impl Player<'_> {
             let joints = || self.picture.anatomy().iter().zip(&grid.joints);
             let position = joints().map(|(joint, series)| joint.angle_to_chain(series.position_rad[point]));
             let torque = joints().map(|(joint, series)| joint.to_chain(series.torque_nm[point]));
-            let logged = LoggedMotion {
+            let logged = ChainSample {
                 position_rad: position.map(|angle| angle as f32).collect(),
                 torque_nm: torque.map(|torque| torque as f32).collect(),
                 segment: Some(segment),

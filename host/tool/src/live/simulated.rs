@@ -126,11 +126,9 @@ impl<'a> Watched<'a> {
 
     /// Reports the tests of the verdict after each unused motion.
     fn judge(&mut self, run: &dyn RunState) {
-        let Some(validated) = run.validated().filter(|validated| *validated != self.validated) else {
-            return;
-        };
+        let Some((validated, findings)) = run.findings(self.validated) else { return };
         self.validated = validated;
-        let outcome = LiveOutcome { validated: true, findings: run.findings(), ..LiveOutcome::default() };
+        let outcome = LiveOutcome { validated: true, findings, ..LiveOutcome::default() };
         self.picture.send(LiveUpdate::Outcome(outcome));
     }
 
@@ -185,8 +183,11 @@ impl<'a> Watched<'a> {
 }
 
 impl Observer for Watched<'_> {
-    fn begin(&mut self, progress: Box<dyn Progress>) {
-        self.progress = Some(progress);
+    fn begin(
+        &mut self,
+        progress: &dyn Fn() -> Result<Box<dyn Progress>, ToolError>,
+    ) -> Result<(), ToolError> {
+        self.progress = Some(progress()?);
         (self.before, self.ticks) = (self.before + self.ticks, 0);
         (self.phase, self.last_logged) = (None, None);
         (self.iterations, self.validated) = (0, 0);
@@ -194,6 +195,7 @@ impl Observer for Watched<'_> {
         self.picture.time_s = self.time_s();
         self.picture.send(LiveUpdate::Outcome(LiveOutcome::default()));
         self.picture.note(Severity::Note, format!("identification {} begins", self.run));
+        Ok(())
     }
 
     fn tick(&mut self, run: &dyn RunState) {

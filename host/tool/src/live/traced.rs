@@ -12,7 +12,7 @@ use scarab_base::error::ToolError;
 use scarab_base::number::Number;
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::RunReport;
-use scarab_identify::run::progress::{LoggedMotion, Progress, ProgressOptions, progress};
+use scarab_identify::run::progress::{ChainSample, Progress, ProgressOptions, progress};
 use scarab_rig::trace::events::{Event, Weight, doing};
 use scarab_rig::trace::read::Trace;
 use scarab_rig::trace::records::{Log, State};
@@ -172,7 +172,7 @@ impl Follower<'_> {
             _ => None,
         };
         let (position_rad, torque_nm) = (log.position_rad.clone(), log.torque_nm.clone());
-        let logged = LoggedMotion { position_rad, torque_nm, segment };
+        let logged = ChainSample { position_rad, torque_nm, segment };
         if self.last_logged.is_some_and(|last| log.tick.wrapping_sub(last) != TICKS_PER_LOG) {
             self.progress.break_off();
             self.picture.restart();

@@ -200,8 +200,10 @@ pub(crate) fn sections(report: &AssistReport, figures: &[Figure]) -> Vec<Section
     let of = |groups: &'static [Group]| figures.iter().filter(|figure| groups.contains(&figure.group));
     let friction = 100.0 * report.stability.friction_share;
     let stability = format!("{STABILITY}{friction:.0} % of viscous friction compensated.");
-    let mut sections =
-        vec![Section::new("Shares").explained("Shares of the models' torques.").table(shares(report))];
+    let mut sections = vec![
+        Section::new("Results").lines(notes(report)),
+        Section::new("Shares").explained("Shares of the models' torques.").table(shares(report)),
+    ];
     if !report.rows.is_empty() {
         let figures = of(&[Group::Summary, Group::Torque]);
         sections.push(
@@ -226,7 +228,6 @@ pub(crate) fn sections(report: &AssistReport, figures: &[Figure]) -> Vec<Section
         );
     }
     sections.push(Section::new("Stability").explained(stability).figures(of(&[Group::Search])));
-    sections.push(Section::new("Results").lines(notes(report)));
     sections.push(Section::new("Limits of these results").explained(LIMITS));
     sections
 }
@@ -238,14 +239,15 @@ pub(crate) fn seeds(report: &AssistReport) -> String {
 }
 
 /// Page of all sections.
-pub(crate) fn page(circumstances: &Circumstances, report: &AssistReport, figures: &[Figure]) -> String {
+pub(crate) fn page(circumstances: &Circumstances, report: &AssistReport, sections: &[Section]) -> String {
     let failures = report.failures();
     let verdict = if failures.is_empty() { "no limit exceeded".to_owned() } else { failures.join(", ") };
     let head = Head {
         kind: "assistance",
         title: &format!("{}: {verdict}", report.leg),
         time_utc: &circumstances.time_utc,
-        lines: &[circumstances.command.clone(), seeds(report)],
+        command: Some(&circumstances.command),
+        lines: &[seeds(report)],
     };
-    sections::page(head, &sections(report, figures))
+    sections::page(head, sections)
 }

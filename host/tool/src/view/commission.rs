@@ -74,9 +74,10 @@ pub(crate) fn page(report: &CommissionReport) -> String {
     let mut sections = vec![Section::new("Steps").table(steps), Section::new("Joints").table(joints(report))];
     if report.verdict.is_some() {
         sections.push(Section::new("Base parameters").explained(BASE).table(table(&report.base)));
+        sections.push(Section::new("All parameters").explained(STATUSES));
         for (name, joint) in ["hip", "knee"].into_iter().zip(&report.joints) {
             let section = Section::new(format!("Parameters of the {name}"));
-            sections.push(section.explained(STATUSES).table(table(&joint.parameters)));
+            sections.push(section.table(table(&joint.parameters)));
         }
     }
     if !report.reasons.is_empty() {
@@ -91,6 +92,7 @@ pub(crate) fn page(report: &CommissionReport) -> String {
         kind: "commissioning",
         title: &format!("{} {:08X}: {verdict}", report.device, report.serial),
         time_utc: &time_utc(),
+        command: None,
         lines: &[firmware],
     };
     sections::page(head, &sections)

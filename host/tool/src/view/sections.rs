@@ -1,4 +1,4 @@
-//! Result of an experiment as sections, made once: the terminal and a page show them.
+//! Result of an experiment as sections: a page shows them, and the terminal those of assistance.
 
 use maud::{DOCTYPE, Markup, html};
 use scarab_base::table::Table;
@@ -68,13 +68,15 @@ pub(crate) struct Head<'a> {
     pub(crate) title: &'a str,
     /// Time, UTC.
     pub(crate) time_utc: &'a str,
-    /// Lines about device or command.
+    /// Command line.
+    pub(crate) command: Option<&'a str>,
+    /// Lines about device or seeds.
     pub(crate) lines: &'a [String],
 }
 
 /// Sections as a page.
 pub(crate) fn page(head: Head<'_>, sections: &[Section]) -> String {
-    let Head { kind, title, time_utc, lines } = head;
+    let Head { kind, title, time_utc, command, lines } = head;
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -85,6 +87,7 @@ pub(crate) fn page(head: Head<'_>, sections: &[Section]) -> String {
                         p.over { "Scarab \u{b7} " (kind) }
                         h1 { (title) }
                         p.when { (time_utc) " (UTC)" }
+                        @if let Some(command) = command { p { code { (command) } } }
                         @for line in lines { p { (line) } }
                     }
                     @for section in sections { (shown(section)) }

@@ -115,7 +115,7 @@ fn the_sheet_lists_exactly_the_node_s_objects_with_size_and_default() {
                 // Objects of a leg cannot be read from a joint alone, and no error has been recorded yet.
                 let refused = match index {
                     0x1F50..0x1F58 => Some(0x0602_0000),
-                    0x1003 | 0x2100..0x219A => Some(0x0800_0024),
+                    0x1003 | 0x2100..=0x2193 => Some(0x0800_0024),
                     _ => None,
                 };
                 if command == 0x80 && refused.is_some() {

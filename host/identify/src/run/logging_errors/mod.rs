@@ -65,7 +65,7 @@ pub(crate) struct Question {
     /// Axis of the first joint in the base frame.
     pub(crate) axis: Vector3<f64>,
     /// Whole recordings.
-    pub(crate) motions: Vec<Motion>,
+    pub(crate) motions: Arc<[Motion]>,
     /// Bandwidth of the rows, Hz.
     pub(crate) bandwidth_hz: f64,
     /// Base parameters of the prior.

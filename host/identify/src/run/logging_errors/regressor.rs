@@ -12,33 +12,23 @@ use scarab::model::Parameter;
 use crate::run::logging_errors::table::Table;
 use crate::run::resample::{PENDING, TAPS};
 
-/// Smoothed motion of all joints at one instant.
-#[derive(Clone, Debug, PartialEq)]
+/// Largest number of joints of a leg.
+const MOST_JOINTS: usize = 3;
+
+/// Smoothed motion of all joints at one instant; zero beyond the leg's joints.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Instant {
     /// Chain angles, rad.
-    pub(crate) position: Vec<f64>,
+    pub(crate) position: [f64; MOST_JOINTS],
     /// Speeds, rad/s.
-    pub(crate) velocity: Vec<f64>,
+    pub(crate) velocity: [f64; MOST_JOINTS],
     /// Accelerations, rad/s^2.
-    pub(crate) acceleration: Vec<f64>,
+    pub(crate) acceleration: [f64; MOST_JOINTS],
     /// Measured torques, N m.
-    pub(crate) torque: Vec<f64>,
+    pub(crate) torque: [f64; MOST_JOINTS],
 }
 
 impl Instant {
-    /// Zeros for this number of joints.
-    pub(crate) fn zeros(joints: usize) -> Self {
-        let zeros = vec![0.0; joints];
-        Self { position: zeros.clone(), velocity: zeros.clone(), acceleration: zeros.clone(), torque: zeros }
-    }
-
-    fn copy_from(&mut self, other: &Self) {
-        self.position.clone_from(&other.position);
-        self.velocity.clone_from(&other.velocity);
-        self.acceleration.clone_from(&other.acceleration);
-        self.torque.clone_from(&other.torque);
-    }
-
     fn sized<const N: usize>(&self) -> Smoothed<f64, N> {
         let array = |values: &[f64]| core::array::from_fn(|joint| values[joint]);
         Smoothed {
@@ -110,11 +100,10 @@ impl<const N: usize, const B: usize> Regressor for RowModel<f64, N, B> {
         change: &dyn Fn(&mut Instant),
     ) -> Filtered {
         let mut filter = Box::new(RowFilter::<f64, N, B, PENDING>::new(Ends::Whole));
-        let mut changed = Instant::zeros(N);
         let mut rows =
             Filtered { regressor: Table::new(self.rank()), torque: Vec::new(), is_usable: Vec::new() };
         for instant in instants {
-            changed.copy_from(instant);
+            let mut changed = *instant;
             change(&mut changed);
             let filtered: Option<FilteredRows<f64, N, B>> =
                 filter.push(low_pass, &RowModel::rows(self, &changed.sized()));

@@ -90,7 +90,8 @@ impl Part {
             (columns(&motion.position), columns(&motion.torque));
         let samples = motion.position.len();
         let instants = (reach..samples.saturating_sub(reach)).map(|at| {
-            let mut instant = Instant { torque: motion.torque[at].to_vec(), ..Instant::zeros(joints) };
+            let mut instant = Instant::default();
+            instant.torque[..joints].copy_from_slice(&motion.torque[at]);
             for joint in 0..joints {
                 let window = &angles[joint][at - reach..=at + reach];
                 (instant.position[joint], instant.velocity[joint], instant.acceleration[joint]) =
@@ -166,7 +167,7 @@ impl RowSource {
 #[derive(Clone)]
 pub(crate) struct Equations {
     filters: Filters,
-    parts: Vec<Part>,
+    parts: Arc<[Part]>,
     /// Regressor of the leg.
     pub(crate) regressor: Arc<dyn Regressor>,
     /// Columns that are estimated.
@@ -370,21 +371,21 @@ impl Equations {
     /// ends.
     pub(crate) fn rate_of(&self, series: &[f64]) -> Vec<f64> {
         let step = DECIMATION as f64 / SAMPLE_RATE_HZ;
-        let mut slots: Vec<Vec<usize>> = Vec::new();
+        let joints = self.joints();
+        let mut slots: Vec<usize> = Vec::new();
         let mut starts = Vec::with_capacity(self.parts.len());
-        for part in &self.parts {
+        for part in &*self.parts {
             starts.push(slots.len());
-            slots.resize(slots.len() + part.instants.len() / DECIMATION + 2, vec![usize::MAX; self.joints()]);
+            slots.resize(slots.len() + joints * (part.instants.len() / DECIMATION + 2), usize::MAX);
         }
         for (index, source) in self.sources.iter().enumerate() {
-            slots[starts[source.motion] + source.row][source.joint] = index;
+            slots[starts[source.motion] + joints * source.row + source.joint] = index;
         }
         let at = |source: &RowSource, offset: isize| -> Option<f64> {
             let row = source.row.checked_add_signed(offset)?;
             let end = starts.get(source.motion + 1).copied().unwrap_or(slots.len());
-            let slot = starts[source.motion] + row;
-            let index = *slots.get(slot).filter(|_| slot < end)?.get(source.joint)?;
-            series.get(index).copied()
+            let slot = starts[source.motion] + joints * row + source.joint;
+            series.get(*slots.get(slot).filter(|_| slot < end)?).copied()
         };
         let rate = |source: &RowSource| -> f64 {
             let [two_back, back, on, two_on] = [-2, -1, 1, 2].map(|offset| at(source, offset));

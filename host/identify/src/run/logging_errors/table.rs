@@ -38,7 +38,7 @@ impl Table {
         )
     }
 
-    /// Appends a row; a longer one is cut.
+    /// Appends a row of at least this width; a longer one is cut.
     pub(crate) fn push(&mut self, row: &[f64]) {
         self.elements.extend_from_slice(&row[..self.width]);
     }

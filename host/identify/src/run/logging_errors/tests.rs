@@ -97,7 +97,7 @@ fn question_of(model: RowModel<f64, 2, COLUMNS>, motions: Vec<Motion>) -> Questi
         active: vec![true; prior.len()],
         anatomy: vec![AnatomicalJoint::identity(); 2],
         axis: Vector3::new(0.0, 0.0, 1.0),
-        motions,
+        motions: motions.into(),
         bandwidth_hz: 8.0,
         sigma: vec![0.0; prior.len()],
         prior: Some(prior),
@@ -344,7 +344,7 @@ fn what_drifts_is_found_at_its_size_and_refused_beyond_the_accepted_error() {
         assert_eq!((cause.name, cause.joint), (name, Some(1)), "{}", cause.words);
     }
     // An excluded stretch cuts a recording in two; the drift goes on.
-    let whole = drifting(|share, _, _| 6.0 * share).motions.remove(0);
+    let whole = drifting(|share, _, _| 6.0 * share).motions[0].clone();
     let piece = |from: usize, to: usize| Motion {
         within_s: [from as f64 / 500.0, 20.0],
         position: Table::of_rows(2, whole.position.rows().take(to).skip(from)),

@@ -291,7 +291,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             active: (0..rank).map(|base| !dropped[base]).collect(),
             anatomy: self.anatomy.to_vec(),
             axis: Vector3::new(0.0, -sine, cosine),
-            motions,
+            motions: motions.into(),
             bandwidth_hz: self.options.bandwidth_hz,
             prior,
             torque_limit: self.leg.joints.iter().map(|joint| joint.torque_limit_nm).collect(),

@@ -10,7 +10,7 @@ use scarab_client::alarms::{Alarms, reason};
 use scarab_client::words::{JointState, doing};
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::formats::model_file::ModelFile;
-use scarab_identify::run::progress::{LoggedMotion, Progress, ProgressOptions, progress};
+use scarab_identify::run::progress::{ChainSample, Progress, ProgressOptions, progress};
 
 use crate::live::bus::BusStatus;
 use crate::live::bus::node::{Event, NmtState, Node};
@@ -97,7 +97,7 @@ impl<'a> Leg<'a> {
         out: &'a dyn Fn(LiveUpdate),
     ) -> Result<Self, ToolError> {
         // The leg on the bus is not the one of the leg file: its true parameters are unknown.
-        let options = ProgressOptions { knows_truth: false, ..ProgressOptions::new(BANDWIDTH_HZ) };
+        let options = ProgressOptions { reports_truth: false, ..ProgressOptions::new(BANDWIDTH_HZ) };
         let mut progress = progress(leg, &options)?;
         if let Some(model) = model {
             let set = &model.base_set;
@@ -237,7 +237,7 @@ impl<'a> Leg<'a> {
             let time_s = self.next as f64 * SAMPLE_S;
             let share = ((time_s - from.time_s) / (to.time_s - from.time_s)).clamp(0.0, 1.0);
             let between = |from: f64, to: f64| (from + share * (to - from)) as f32;
-            let logged = LoggedMotion {
+            let logged = ChainSample {
                 position_rad: self.of_joints(|joint| between(from.position[joint], to.position[joint])),
                 torque_nm: self.of_joints(|joint| between(from.torque[joint], to.torque[joint])),
                 segment: Some(Segment::Tracking),

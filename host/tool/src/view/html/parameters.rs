@@ -51,7 +51,7 @@ pub(crate) const fn split(has_prior: bool) -> &'static str {
 }
 
 /// Meaning of each status.
-pub(crate) fn statuses(has_prior: bool) -> Markup {
+fn statuses(has_prior: bool) -> Markup {
     html! {
         p { (badge("identified")) " measured alone. " (badge("grouped"))
             " only sums with the parameters beside it are measured, " (split(has_prior)) ". " (badge("weak"))
