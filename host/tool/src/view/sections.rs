@@ -23,6 +23,13 @@ impl Section {
         Self { title: title.into(), ..Self::default() }
     }
 
+    fn is_empty(&self) -> bool {
+        self.explanation.is_empty()
+            && self.table.is_empty()
+            && self.lines.is_empty()
+            && self.figures.is_empty()
+    }
+
     /// Adds sentences that only a page shows.
     pub(crate) fn explained(mut self, explanation: impl Into<String>) -> Self {
         self.explanation = explanation.into();
@@ -90,7 +97,7 @@ pub(crate) fn page(head: Head<'_>, sections: &[Section]) -> String {
                         @if let Some(command) = command { p { code { (command) } } }
                         @for line in lines { p { (line) } }
                     }
-                    @for section in sections { (shown(section)) }
+                    @for section in sections.iter().filter(|section| !section.is_empty()) { (shown(section)) }
                 }
             }
         }
