@@ -34,6 +34,12 @@ class Outcome:
         found = (self.report or {}).get("likely_cause")
         return (found["name"], found.get("joint"), found.get("value"), found.get("sigma")) if found else None
 
+    @property
+    def possible(self):
+        """Name and joint of each cause that an unknown one lists."""
+        found = (self.report or {}).get("likely_cause") or {}
+        return [(cause["name"], cause["joint"]) for cause in found.get("possible", [])]
+
     def parameters(self):
         """Base parameters with a sigma: name -> (terms, value, sigma)."""
         rows = (self.report or {}).get("base_parameters", [])

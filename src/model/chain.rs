@@ -108,12 +108,13 @@ impl<T: Real, const N: usize> Chain<T, N> {
     }
 
     /// True if the common normal before `joint` has a nonzero length.
-    pub(crate) fn has_length(&self, joint: usize) -> bool {
+    pub fn has_length(&self, joint: usize) -> bool {
         self.placements.get(joint).is_some_and(|placement| placement.a != T::zero())
     }
 
     /// Returns the chain with the length before `joint` multiplied by `factor`.
-    pub(crate) fn with_length(&self, joint: usize, factor: T) -> Self {
+    #[must_use]
+    pub fn with_length(&self, joint: usize, factor: T) -> Self {
         let mut changed = *self;
         if let Some(placement) = changed.placements.get_mut(joint) {
             placement.a *= factor;

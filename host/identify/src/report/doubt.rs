@@ -105,8 +105,13 @@ pub struct CauseReport {
     pub(crate) value: Number,
     /// Standard deviation of the size.
     pub(crate) sigma: Number,
+    /// Share of the misfit beyond the noise that it explains, 0..1; `null` where it is no correction.
+    pub(crate) explained: Number,
     /// Sentence with the evidence.
     pub words: String,
+    /// Where the cause is unknown: corrections that explain part of the misfit.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) possible: Vec<CauseReport>,
     /// Units in which the cause reads the columns.
     #[serde(skip)]
     pub(crate) reads: Vec<ReadAs>,
@@ -284,8 +289,13 @@ fn digits(sigma: f64) -> usize {
 impl CauseReport {
     /// Printed line.
     pub fn line(&self) -> String {
+        format!("likely cause: {}", self.named())
+    }
+
+    /// Name and sentence.
+    pub(crate) fn named(&self) -> String {
         let name = format!("{}: ", self.name.replace('_', " "));
-        format!("likely cause: {name}{}", self.words.strip_prefix(&name).unwrap_or(&self.words))
+        format!("{name}{}", self.words.strip_prefix(&name).unwrap_or(&self.words))
     }
 
     /// Whether the line contains what a finding says, so that it suffices.

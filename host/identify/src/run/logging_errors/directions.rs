@@ -45,7 +45,7 @@ use scarab::real::dot;
 
 use crate::run::logging_errors::fit::{Fit, Score};
 use crate::run::logging_errors::regressor::Instant;
-use crate::run::logging_errors::rows::Equations;
+use crate::run::logging_errors::rows::{Equations, RowSource};
 use crate::run::logging_errors::table::Table;
 
 /// Standard deviations that chance exceeds once in ten million tests.
@@ -136,6 +136,12 @@ impl Kind {
             | Self::Drift(_, joint) => Some(joint),
             Self::Gravity => None,
         }
+    }
+
+    /// Whether the same error of several joints is tried at once: it changes the equations of its joint only.
+    /// A delay of all joints is one error with one value.
+    pub(crate) fn is_combined(self) -> bool {
+        !matches!(self, Self::EncoderScale(_) | Self::Gravity | Self::Delay(_))
     }
 
     /// Unit of reports and the factor to it.
@@ -293,7 +299,10 @@ impl<'a> Directions<'a> {
         let all = self.equations;
         let plain = Cow::Borrowed(all.torque.as_slice());
         match kind {
-            Kind::Delay(joint) => (Cow::Borrowed(&all.columns), Cow::Owned(all.delayed(Some(joint), value))),
+            Kind::Delay(joint) => {
+                let late = |source: &RowSource| (source.joint == joint).then_some(value);
+                (Cow::Borrowed(&all.columns), Cow::Owned(all.delayed(late)))
+            }
             Kind::EncoderScale(joint) => (Cow::Owned(self.scaled(joint, 1.0 / (1.0 + value))), plain),
             Kind::TorqueScale(joint) => {
                 let mut columns = all.columns.clone();

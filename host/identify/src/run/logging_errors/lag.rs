@@ -13,7 +13,7 @@
 
 use crate::report::doubt::CauseReport;
 use crate::run::logging_errors::fit::Fit;
-use crate::run::logging_errors::rows::Equations;
+use crate::run::logging_errors::rows::{Equations, RowSource};
 use crate::run::logging_errors::table::Table;
 use crate::run::logging_errors::{Refitted, joint_words};
 
@@ -38,23 +38,15 @@ enum Kind {
     Filter,
 }
 
-/// A lag with the parameters fitted beside it.
-pub(crate) struct Lag {
-    pub(crate) refitted: Refitted,
-    /// Time over its standard deviation.
-    pub(crate) significance: f64,
-    /// Cost of the equations of the lagging joints.
-    own_cost: f64,
-}
-
 /// Delay of all torques, then the low-pass of all and of each joint where it fits better than a delay.
-pub(crate) fn all(equations: &Equations) -> Vec<Lag> {
+pub(crate) fn all(equations: &Equations) -> Vec<Refitted> {
     let search = Search { equations, every_row: equations.every_row() };
     let mut found = Vec::new();
     let joints = equations.joints();
     for joint in (0..joints).map(Some).chain((joints > 1).then_some(None)) {
-        let [delay, filter] = [Kind::Delay, Kind::Filter].map(|kind| search.one(kind, joint));
-        let is_clearer = CLEARER * CLEARER * filter.own_cost < delay.own_cost;
+        let [(delay, delay_cost), (filter, filter_cost)] =
+            [Kind::Delay, Kind::Filter].map(|kind| search.one(kind, joint));
+        let is_clearer = CLEARER * CLEARER * filter_cost < delay_cost;
         // The delay of one joint is one of the directions.
         found.extend(joint.is_none().then_some(delay));
         found.extend(is_clearer.then_some(filter));
@@ -72,7 +64,11 @@ impl Search<'_> {
     fn system(&self, kind: Kind, joint: Option<usize>, time_s: f64) -> (Table, Vec<f64>) {
         let all = self.equations;
         match kind {
-            Kind::Delay => (all.columns.clone(), all.delayed(joint, time_s)),
+            Kind::Delay => {
+                let late =
+                    |source: &RowSource| joint.is_none_or(|joint| joint == source.joint).then_some(time_s);
+                (all.columns.clone(), all.delayed(late))
+            }
             Kind::Filter => (all.low_passed(&self.every_row, joint, time_s), all.torque.clone()),
         }
     }
@@ -82,7 +78,8 @@ impl Search<'_> {
         self.equations.fit(&columns, &torque, false)
     }
 
-    fn one(&self, kind: Kind, joint: Option<usize>) -> Lag {
+    /// A lag with the parameters fitted beside it, and the cost of the equations of the lagging joints.
+    fn one(&self, kind: Kind, joint: Option<usize>) -> (Refitted, f64) {
         let all = self.equations;
         let largest_s = all.largest_delay_s();
         let cost = |time_s: f64| self.fit(kind, joint, time_s).cost;
@@ -107,23 +104,17 @@ impl Search<'_> {
         };
         let scored = all.score(&fit, &columns, &torque, &slope);
         let remaining = (fit.cost / plain.max(1e-300)).min(1.0);
-        let rows = fit.residuals(&columns, &torque).into_iter().zip(&all.weight).zip(&all.sources);
-        let own_cost = rows
-            .filter(|(_, source)| joint.is_none_or(|joint| joint == source.joint))
-            .map(|((residual, weight), _)| (residual * weight).powi(2))
-            .sum();
+        let cost = all.cost_of_joints(&fit.residuals(&columns, &torque));
+        let own_cost = joint.map_or_else(|| cost.iter().sum(), |joint| cost[joint]);
         let sigma_s = (remaining.sqrt() * scored.noise_sigma).max(scored.segment_sigma);
-        Lag {
-            refitted: Refitted {
-                cause: cause(kind, joint, time_s, sigma_s, remaining),
-                remaining,
-                values: fit.values,
-                columns,
-                torque,
-            },
+        let refitted = Refitted {
+            cause: cause(kind, joint, time_s, sigma_s),
+            values: fit.values,
+            columns,
+            torque,
             significance: time_s / sigma_s.max(1e-12),
-            own_cost,
-        }
+        };
+        (refitted, own_cost)
     }
 }
 
@@ -145,10 +136,9 @@ pub(super) fn least(mut low: f64, mut high: f64, cost: impl Fn(f64) -> f64) -> f
     0.5 * (low + high)
 }
 
-fn cause(kind: Kind, joint: Option<usize>, time_s: f64, sigma_s: f64, remaining: f64) -> CauseReport {
+fn cause(kind: Kind, joint: Option<usize>, time_s: f64, sigma_s: f64) -> CauseReport {
     let joints = joint_words(joint);
     let (time_ms, sigma_ms) = (1e3 * time_s, 1e3 * sigma_s);
-    let explained = 100.0 * (1.0 - remaining);
     let (name, words) = match kind {
         Kind::Delay => ("delay", format!("torque of {joints}: {time_ms:.1} +- {sigma_ms:.1} ms late")),
         Kind::Filter => (
@@ -165,7 +155,7 @@ fn cause(kind: Kind, joint: Option<usize>, time_s: f64, sigma_s: f64, remaining:
         joint: joint.map(|joint| joint + 1),
         value: time_ms.into(),
         sigma: sigma_ms.into(),
-        words: format!("{words}; fitted, it explains {explained:.0} % of the misfit"),
+        words,
         ..CauseReport::default()
     }
 }

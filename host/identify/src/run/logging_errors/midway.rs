@@ -25,7 +25,7 @@ const EXPLAINED_SHARE: f64 = 0.1;
 /// wrong.
 const SMALLEST_SIDE: f64 = 0.02;
 /// Points of change tried in each recording.
-const POINTS: usize = 39;
+pub(super) const POINTS: usize = 39;
 
 /// Best change.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -155,7 +155,7 @@ fn strongest(all: &Equations) -> Option<Midway> {
     Some(found)
 }
 
-fn is_after(source: &RowSource, scope: Option<usize>, joint: Option<usize>, share: f64) -> bool {
+pub(super) fn is_after(source: &RowSource, scope: Option<usize>, joint: Option<usize>, share: f64) -> bool {
     source.share > share
         && scope.is_none_or(|motion| source.motion == motion)
         && joint.is_none_or(|joint| source.joint == joint)

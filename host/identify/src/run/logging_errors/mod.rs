@@ -12,24 +12,28 @@
 //! | [`fit`] | least squares, a further column beside it, both standard deviations |
 //! | [`directions`] | delay, encoder scale, torque scale, gravity, springs, drifts |
 //! | [`lag`] | low-pass or delay of the torque as a cause |
-//! | [`assumption`] | another clock, no weight, absolute angles as a cause |
+//! | [`assumption`] | clocks, weight, lengths, absolute angles, crosstalk, friction by load as a cause |
 //! | [`midway`] | gain or sign of the torque that changes midway |
 //! | [`encoder`] | bias by the steps of an encoder |
 //! | [`noise`] | noise of the torque at the recording's own rate |
 //! | [`samples`], [`stamps`] | samples that no sensor measured, wrong time stamps |
 //! | [`cause`] | most likely cause of a refusal, by refits |
+//! | [`corrections`] | units, signs and columns that are tried |
+//! | [`refused`] | what a correction leaves of the misfit |
 //! | [`report`] | JSON and lines |
 //!
 //! Runs on the host only.
 
 pub(crate) mod assumption;
 pub(crate) mod cause;
+pub(crate) mod corrections;
 pub(crate) mod directions;
 pub(crate) mod encoder;
 pub(crate) mod fit;
 pub(crate) mod lag;
 pub(crate) mod midway;
 pub(crate) mod noise;
+pub(crate) mod refused;
 pub(crate) mod regressor;
 pub(crate) mod report;
 pub(crate) mod rows;
@@ -88,6 +92,11 @@ impl Question {
     /// Number of joints.
     pub(crate) fn joints(&self) -> usize {
         self.regressor.joints()
+    }
+
+    /// Whether a base parameter must be positive.
+    pub(crate) fn is_bounded(&self, base: usize) -> bool {
+        self.regressor.carrier(base).is_some_and(|(_, kind)| kind.is_never_negative())
     }
 
     /// Chain angles of the joints' zeros, rad.
@@ -149,14 +158,14 @@ impl Question {
 pub(crate) struct Refitted {
     /// The error as a cause.
     pub(crate) cause: CauseReport,
-    /// Part of the misfit's power that remains.
-    pub(crate) remaining: f64,
-    /// All parameters.
+    /// All parameters, then those of further columns.
     pub(crate) values: Vec<f64>,
-    /// Columns of the parameters.
+    /// Columns of the parameters, then further ones.
     pub(crate) columns: Table,
     /// Torques that they explain.
     pub(crate) torque: Vec<f64>,
+    /// Size of the error over its standard deviation; infinite without one.
+    pub(crate) significance: f64,
 }
 
 /// Results of all checks.
@@ -171,6 +180,8 @@ pub(crate) struct LoggingErrors {
     pub(crate) midway: Option<Midway>,
     /// Misfit over noise of each joint; `None` where the noise is unknown.
     pub(crate) misfit_over_noise: Vec<Option<f64>>,
+    /// Part of the weighted misfit's power that is not noise, 0..1; one where the noise is unknown.
+    pub(crate) systematic: f64,
     /// Standard deviation of each base parameter: noise, scatter over segments, and possible errors that were
     /// not refused.
     pub(crate) sigma: Vec<Sigma>,
@@ -263,7 +274,17 @@ impl LoggingErrors {
             }
         }
         let midway = midway::find(&equations);
-        Ok(Some(Self { equations, found, directions, midway, misfit_over_noise, sigma, encoder, better_hz }))
+        Ok(Some(Self {
+            equations,
+            found,
+            directions,
+            midway,
+            misfit_over_noise,
+            systematic,
+            sigma,
+            encoder,
+            better_hz,
+        }))
     }
 
     /// Findings for the verdict.

@@ -70,6 +70,8 @@ pub(crate) trait Regressor: Send + Sync {
     ) -> Filtered;
     /// Regressor with gravity mapped to another vector, m/s^2 in the base frame.
     fn with_gravity(&self, map: &dyn Fn(Vector3<f64>) -> Vector3<f64>) -> Arc<dyn Regressor>;
+    /// Regressor with the link before a joint longer by this factor; `None` where it has no length.
+    fn with_length(&self, joint: usize, factor: f64) -> Option<Arc<dyn Regressor>>;
     /// Regressor for rows of this share of its bandwidth.
     fn with_bandwidth(&self, share: f64) -> Arc<dyn Regressor>;
     /// Regressor without Stribeck friction; `None` if it has none.
@@ -118,6 +120,11 @@ impl<const N: usize, const B: usize> Regressor for RowModel<f64, N, B> {
 
     fn with_gravity(&self, map: &dyn Fn(Vector3<f64>) -> Vector3<f64>) -> Arc<dyn Regressor> {
         Arc::new(Self { gravity: map(self.gravity), ..self.clone() })
+    }
+
+    fn with_length(&self, joint: usize, factor: f64) -> Option<Arc<dyn Regressor>> {
+        let chain = self.chain.with_length(joint, factor);
+        self.chain.has_length(joint).then(|| Arc::new(Self { chain, ..self.clone() }) as Arc<dyn Regressor>)
     }
 
     fn with_bandwidth(&self, share: f64) -> Arc<dyn Regressor> {

@@ -6,7 +6,7 @@ use crate::report::NEGLIGIBLE_PERCENT;
 use crate::report::doubt::{CauseReport, DirectionReport};
 use crate::run::logging_errors::Question;
 use crate::run::logging_errors::directions::{
-    CHANCE, Drifting, EXPLAINED_SHARE, Found, Kind, SMALLEST_SYSTEMATIC, TOLERATED_SHIFT,
+    CHANCE, Drifting, EXPLAINED_SHARE, Found, Kind, SMALLEST_SYSTEMATIC, TOLERATED_SHIFT, label,
 };
 
 impl DirectionReport {
@@ -59,19 +59,14 @@ impl DirectionReport {
 }
 
 impl CauseReport {
-    /// A direction as the likely cause.
-    pub(crate) fn direction(kind: Kind, direction: &DirectionReport) -> Self {
-        Self {
-            name: kind.name(),
-            joint: direction.joint,
-            value: direction.value,
-            sigma: direction.sigma,
-            words: format!(
-                "{}; fitted, it explains {:.0} % of the misfit",
-                direction.words(),
-                100.0 * direction.explained.known().unwrap_or(0.0)
-            ),
-            reads: Vec::new(),
+    /// A direction as a cause.
+    pub(crate) fn direction(found: &Found, direction: &DirectionReport) -> Self {
+        let mut words = direction.words();
+        if !found.alike.is_empty() {
+            words +=
+                &format!(" ({} cannot be distinguished from {})", label(found.kind), found.alike.join(", "));
         }
+        let DirectionReport { joint, value, sigma, .. } = *direction;
+        Self { name: found.kind.name(), joint, value, sigma, words, ..Self::default() }
     }
 }

@@ -325,18 +325,37 @@ impl Equations {
         self.sources.iter().map(angle).collect()
     }
 
-    /// Torque of all equations; that of `joint`, or of all joints, taken `late_s` after the angle.
-    pub(crate) fn delayed(&self, joint: Option<usize>, late_s: f64) -> Vec<f64> {
+    /// Torque of all equations; where `late_s` gives a time, that much after the angle.
+    pub(crate) fn delayed(&self, late_s: impl Fn(&RowSource) -> Option<f64>) -> Vec<f64> {
         let pairs = self.sources.iter().zip(&self.torque);
         pairs
-            .map(|(source, &torque)| {
-                if joint.is_none_or(|joint| joint == source.joint) {
-                    self.parts[source.motion].torque(source.joint, source.row, late_s)
-                } else {
-                    torque
-                }
+            .map(|(source, &torque)| match late_s(source) {
+                Some(late_s) => self.parts[source.motion].torque(source.joint, source.row, late_s),
+                None => torque,
             })
             .collect()
+    }
+
+    /// Time of an equation from the middle of its recording, s.
+    pub(crate) fn time_from_middle_s(&self, source: &RowSource) -> f64 {
+        source.drift() * self.parts[source.motion].within_s[1]
+    }
+
+    /// Low-passed torques of a changed motion, for the same equations.
+    pub(crate) fn torques_of(&self, change: &dyn Fn(&mut Instant)) -> Vec<f64> {
+        let rows = self.parts.iter().map(|part| part.rows(&self.filters, &*self.regressor, change).torque);
+        let parts: Vec<Vec<f64>> = rows.collect();
+        let joints = self.joints();
+        self.sources.iter().map(|source| parts[source.motion][source.row * joints + source.joint]).collect()
+    }
+
+    /// Sum of squared weighted residuals of each joint.
+    pub(crate) fn cost_of_joints(&self, residuals: &[f64]) -> Vec<f64> {
+        let mut cost = vec![0.0; self.joints()];
+        for ((residual, weight), source) in residuals.iter().zip(&self.weight).zip(&self.sources) {
+            cost[source.joint] += (residual * weight).powi(2);
+        }
+        cost
     }
 
     /// Columns of every row of every recording, including rows without an equation.

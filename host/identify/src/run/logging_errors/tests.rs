@@ -65,12 +65,15 @@ fn motion(late_s: [f64; 2], seed: u64) -> Motion {
     motion_of(&model(), late_s, seed)
 }
 
-fn motion_of(model: &RowModel<f64, 2, COLUMNS>, late_s: [f64; 2], seed: u64) -> Motion {
+/// Torque of a joint without noise.
+fn torque_of(model: &RowModel<f64, 2, COLUMNS>, joint: usize, time_s: f64) -> f64 {
     let values = model.base.project(&prior_parameters(&truth()));
+    model.rows(&instant(time_s)).regressor[joint].iter().zip(&values).map(|(y, p)| y * p).sum()
+}
+
+fn motion_of(model: &RowModel<f64, 2, COLUMNS>, late_s: [f64; 2], seed: u64) -> Motion {
     let mut random = Random::new("", seed);
-    let torque = |joint: usize, time_s: f64| -> f64 {
-        model.rows(&instant(time_s)).regressor[joint].iter().zip(&values).map(|(y, p)| y * p).sum()
-    };
+    let torque = |joint: usize, time_s: f64| torque_of(model, joint, time_s);
     let mut motion = Motion {
         training_s: f64::INFINITY,
         within_s: [0.0, 20.0],
@@ -255,7 +258,7 @@ fn a_sign_that_changes_midway_is_found_with_its_time() {
 #[test]
 fn units_signs_and_columns_are_named() {
     type Damage = fn(&mut [f64], &mut [f64]);
-    let cases: [(&str, Damage); 11] = [
+    let cases: [(&str, Damage); 10] = [
         ("torque_sign", |_, torques| torques.iter_mut().for_each(|torque| *torque = -*torque)),
         ("torque_unit", |_, torques| torques.iter_mut().for_each(|torque| *torque *= 1000.0)),
         ("angle_unit", |angles, _| angles.iter_mut().for_each(|angle| *angle = angle.to_degrees())),
@@ -264,7 +267,6 @@ fn units_signs_and_columns_are_named() {
         ("direction", |angles, torques| (angles[0], torques[0]) = (-angles[0], -torques[0])),
         ("angle_sign", |angles, _| angles[1] = -angles[1]),
         ("absolute_angle", |angles, _| angles[1] += angles[0]),
-        ("coupled_drive", |_, torques| torques[0] -= torques[1]),
         ("unsigned_torque", |_, torques| torques.iter_mut().for_each(|torque| *torque = torque.abs())),
         // Per mille of 20 and 10 N m.
         ("torque_unit", |_, torques| (torques[0], torques[1]) = (50.0 * torques[0], 100.0 * torques[1])),
@@ -301,6 +303,70 @@ fn another_clock_and_a_torque_without_weight_are_named() {
     weightless.gravity = Vector3::zeros();
     let damaged = motion_of(&weightless, [0.0; 2], 1);
     assert_eq!(cause_of(&question(vec![damaged])).name, "no_gravity");
+}
+
+/// Changes the torques of every sample, from its time, s, and its motion.
+fn with_torques(change: impl Fn(f64, &Smoothed<f64, 2>, &mut [f64])) -> Question {
+    let mut damaged = motion([0.0; 2], 1);
+    for (index, torques) in damaged.torque.rows_mut().enumerate() {
+        let time_s = index as f64 / 500.0;
+        change(time_s, &instant(time_s), torques);
+    }
+    question(vec![damaged])
+}
+
+#[test]
+fn assumptions_that_fail_are_found_at_their_size() {
+    let load = |torques: &mut [f64], motion: &Smoothed<f64, 2>, joint: usize, share: f64| {
+        torques[joint] += share * motion.velocity[joint].signum() * torques[joint].abs();
+    };
+    // The torque falls behind by this share of the time.
+    let late = |rate: f64| {
+        with_torques(|time_s, _, torques| {
+            for (joint, torque) in torques.iter_mut().enumerate() {
+                let behind_s = rate * (time_s - 10.0);
+                *torque += torque_of(&model(), joint, time_s - behind_s) - torque_of(&model(), joint, time_s);
+            }
+        })
+    };
+    let cases: Vec<(&str, Option<usize>, f64, Question)> = vec![
+        ("crosstalk", Some(2), 5.0, with_torques(|_, _, torques| torques[1] += 0.05 * torques[0])),
+        ("coupled_drive", Some(2), -100.0, with_torques(|_, _, torques| torques[0] -= torques[1])),
+        ("load_friction", Some(1), 10.0, with_torques(|_, motion, torques| load(torques, motion, 0, 0.1))),
+        ("torque_clock", None, 2000.0, late(2e-3)),
+        (
+            "offset_step",
+            Some(2),
+            3.0,
+            with_torques(|time_s, _, torques| {
+                torques[1] += if time_s > 12.0 { 3.0 } else { 0.0 };
+            }),
+        ),
+        ("link_length", Some(2), 12.5, question_of(arm(0.0, 0.4), vec![motion([0.0; 2], 1)])),
+    ];
+    for (name, joint, size, question) in cases {
+        let cause = cause_of(&question);
+        assert_eq!((cause.name, cause.joint), (name, joint), "{}", cause.words);
+        let (value, sigma) = (cause.value.known().expect("a size"), cause.sigma.known().expect("a size"));
+        // 6 % for what the torque's own damage adds to the torque that friction is measured against.
+        assert!((value - size).abs() < 4.0 * sigma + 0.06 * size.abs(), "{name}: {value} +- {sigma}");
+        assert!(cause.explained.known().expect("a share") > 0.8, "{}", cause.words);
+    }
+}
+
+/// Something that no correction describes, and an offset that drifts beside it.
+#[test]
+fn a_cause_that_explains_less_than_half_is_not_named_alone() {
+    let sum = with_torques(|time_s, motion, torques| {
+        torques[0] += 4.0 * (2.9 * time_s).sin() * motion.position[1] + 6.0 * (time_s / 20.0 - 0.5);
+        torques[1] += 2.0 * (3.7 * time_s).sin() * motion.position[0];
+    });
+    let cause = cause_of(&sum);
+    assert_eq!((cause.name, cause.value.known()), (refused::UNKNOWN, None), "{}", cause.words);
+    let drift = cause.possible.iter().find(|cause| cause.name == "offset_drift").expect("listed");
+    assert!(cause.words.contains(&drift.words), "{}", cause.words);
+    let share = drift.explained.known().expect("a share");
+    assert!((0.1..0.5).contains(&share), "{share}");
 }
 
 #[test]

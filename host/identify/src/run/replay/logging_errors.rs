@@ -24,7 +24,9 @@ use crate::run::logging_errors::encoder::{Encoder, Encoders};
 use crate::run::logging_errors::regressor::Regressor;
 use crate::run::logging_errors::rows::{Equations, Filters, Motion};
 use crate::run::logging_errors::table::Table;
-use crate::run::logging_errors::{LoggingErrors, Question, cause, noise as scatter, sample_finding};
+use crate::run::logging_errors::{
+    LoggingErrors, Question, cause, corrections, noise as scatter, refused, sample_finding,
+};
 use crate::run::replay::cleaning::cleaned;
 use crate::run::replay::read::{Parts, Whole, parts};
 use crate::run::replay::recordings::leave_one_out;
@@ -235,15 +237,15 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         let import = self.options.import.as_ref();
         let mut cause = cause::likely(question, errors, &self.screening.findings, findings);
         // A torque in mN m and a current in mA differ by the torque constants only.
-        let is_scale = cause.name == "unknown" || cause.reads.contains(&ReadAs::MillinewtonMetres);
+        let is_scale = cause.name == refused::UNKNOWN || cause.reads.contains(&ReadAs::MillinewtonMetres);
         if let Some(current) = suspected.take_if(|_| is_scale) {
             return current.clone();
         }
         let with_angles = || {
-            let angles = cause::with_other_angles(question);
+            let angles = corrections::with_other_angles(question);
             angles
                 .iter()
-                .filter(|(read, _)| cause.name == "unknown" || cause.reads.contains(read))
+                .filter(|(read, _)| cause.name == refused::UNKNOWN || cause.reads.contains(read))
                 .find_map(|(read, equations)| units::current(question, equations, import, Some(*read)))
         };
         if let Some(current) = is_scale.then(with_angles).flatten() {
