@@ -173,8 +173,8 @@ impl Recording {
             joints_in_file: self.joints_in_file,
         };
         let (first, second) = (part(0..at), part(at..self.time_s.len()));
-        first.check_length("")?;
-        second.check_length("")?;
+        first.check_length("; it is the part before --split: choose a larger share")?;
+        second.check_length("; it is the part that --split holds out: choose a smaller share")?;
         Ok((first, second))
     }
 

@@ -99,6 +99,7 @@ fn implausible_options_are_refused_with_their_limits() {
         assert_eq!(message, "error: --split: must be above 0 and below 1\n");
     }
     assert_contains(&refused("--split 0.001"), "fourier.csv: too short: 15 samples over 0.028 s");
+    assert_contains(&refused("--split 0.001"), "before --split: choose a larger share");
     assert!(refused(&format!("--split 0.5 --validate {MUJOCO}")).contains("cannot be used with"));
     assert!(refused("--validate no-such-file.csv").contains("no-such-file.csv: cannot be read"));
     assert!(refused("--prior wrong:200").contains("is not a percentage"));

@@ -35,6 +35,8 @@ const MIRRORED: f64 = 1.001;
 
 /// Scale between joints, percent, from which a torque is not in mN m.
 const OTHER_SCALE_PERCENT: f64 = 40.0;
+/// Speed from which a joint moves, rad/s.
+const MOVING_RADPS: f64 = 0.03;
 /// Share of its largest value at which a torque counts as zero, and how often one without sign returns there.
 const NEAR_ZERO: f64 = 0.02;
 const LEAST_RETURNS: usize = 3;
@@ -56,6 +58,9 @@ pub(crate) fn likely(
         return cause;
     }
     let Some(errors) = errors else { return excluded(samples).unwrap_or_else(unknown) };
+    if let Some(cause) = one_way(question, errors, findings) {
+        return cause;
+    }
     // After a change of sign the robust weights exclude the rest, and with it what other corrections leave.
     if let Some(midway) = errors.midway.as_ref().filter(|midway| midway.refuses() && midway.change < -1.0) {
         return changed_midway(midway);
@@ -196,6 +201,29 @@ fn motionless(findings: &[FindingReport]) -> Option<CauseReport> {
         joint: finding.joint,
         value: finding.value,
         words: format!("{}; record a motion that moves every joint", finding.words),
+        ..CauseReport::default()
+    })
+}
+
+/// A joint that moved in one direction only, as the cause of parameters that are not determined.
+fn one_way(question: &Question, errors: &LoggingErrors, findings: &[FindingReport]) -> Option<CauseReport> {
+    findings.iter().find(|finding| !finding.passed && finding.test == Test::Determined.name())?;
+    let is_one_way = |joint: &usize| {
+        let moves = |sign: f64| {
+            let mut instants = errors.equations.smoothed().flat_map(|(instants, _)| instants);
+            instants.any(|instant| sign * instant.velocity[*joint] > MOVING_RADPS)
+        };
+        moves(1.0) != moves(-1.0)
+    };
+    let joint = (0..question.joints()).find(is_one_way)?;
+    Some(CauseReport {
+        name: "motion",
+        joint: Some(joint + 1),
+        words: format!(
+            "joint {} moves in one direction only, which does not distinguish its offset from Coulomb friction: record a \
+             motion in both, or state `offset = \"off\"` in the leg file",
+            joint + 1
+        ),
         ..CauseReport::default()
     })
 }

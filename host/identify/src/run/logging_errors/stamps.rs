@@ -12,7 +12,12 @@
 //! e_k     = stamp k minus the even clock, a straight line through each half second
 //! share   = var(qdd from e) / var(qdd),   var(qdd from e) = 2/5 (2 pi)^4 B^5 S      at most 0.4 %
 //! S       density of qd e at low frequency, from its means over 1 / 4B
+//! missing rows   an angle changes by n = 2 to 6 times the mean of its changes before and after, within n / 8;
+//!                every joint that moves fast does so at once; three times or more
 //! ```
+//!
+//! A counter that stamps the rows hides lost ones: the stamps go on evenly and the leg seems to jump. A joint
+//! moves fast where it changes by 8 times its noise and 6 steps of its encoder from row to row.
 //!
 //! Fast and slow are the upper and lower third of the speeds; r^2 is the square of a median absolute
 //! deviation, so outliers and encoder steps do not count. The share is the relative error of an inertia
@@ -20,11 +25,13 @@
 //! Known limits: a constant error of the stamps delays all columns alike and changes nothing; drifts slower
 //! than half a second do not show.
 
-use scarab_base::stats::{quantile, rms};
 use std::f64::consts::TAU;
+
+use scarab_base::stats::{quantile, rms};
 
 use crate::formats::recording::Recording;
 use crate::report::doubt::SampleFinding;
+use crate::run::logging_errors::encoder::Encoder;
 
 /// Finding of wrong time stamps.
 pub(crate) const TIME_STAMPS: &str = "time_stamps";
@@ -43,8 +50,24 @@ const PIECE_S: f64 = 0.5;
 /// Half the time over which a speed is measured, s.
 const SPEED_S: f64 = 0.03;
 
-/// Examines the time stamps of a recording for rows with this bandwidth.
-pub(crate) fn examine(recording: &Recording, bandwidth_hz: f64) -> Option<SampleFinding> {
+/// Change of a joint from row to row, over its noise and over its encoder's step, from which it is fast.
+const FAST_NOISE: f64 = 8.0;
+const FAST_STEPS: f64 = 6.0;
+/// Largest difference of the changes before and after a jump, over their mean.
+const STEADY: f64 = 0.3;
+/// Largest jump, in changes, and its largest distance from a whole number of them, over that number.
+const LARGEST_JUMP: f64 = 6.0;
+const WHOLE: f64 = 0.125;
+/// Jumps that are no accident.
+const LEAST_JUMPS: usize = 3;
+
+/// Examines the time stamps of a recording for rows with this bandwidth. `described_rad` are the steps of the
+/// encoders by the leg file.
+pub(crate) fn examine(
+    recording: &Recording,
+    described_rad: &[f64],
+    bandwidth_hz: f64,
+) -> Option<SampleFinding> {
     let time = &recording.time_s;
     let median_step = recording.median_step_s();
     if time.len() < 20 || !(median_step > 0.0) {
@@ -60,7 +83,7 @@ pub(crate) fn examine(recording: &Recording, bandwidth_hz: f64) -> Option<Sample
         }
     });
     if !is_wrong {
-        return None;
+        return missing_rows(recording, described_rad, median_step, bandwidth_hz);
     }
     let errors = clock_errors(time, median_step);
     let size = rms(errors.iter().copied());
@@ -88,7 +111,76 @@ pub(crate) fn examine(recording: &Recording, bandwidth_hz: f64) -> Option<Sample
             100.0 * share,
             100.0 * LARGEST_SHARE,
             1e3 * LARGEST_ERROR_S,
-            if refuses { ": record the times of the samples, or choose a lower bandwidth" } else { "" }
+            if refuses {
+                ": replace the stamps by an even clock (--even-stamps), or record the times of the samples"
+            } else {
+                ""
+            }
+        ),
+    })
+}
+
+/// Rows that are missing although the stamps go on.
+fn missing_rows(
+    recording: &Recording,
+    described_rad: &[f64],
+    median_step: f64,
+    bandwidth_hz: f64,
+) -> Option<SampleFinding> {
+    let time = &recording.time_s;
+    // Missing rows between a row and the next one; `None` where no joint is fast, or the joints disagree.
+    let mut missing: Vec<Option<f64>> = vec![None; time.len()];
+    let mut differ = vec![false; time.len()];
+    for (joint, &described) in recording.joints.iter().zip(described_rad) {
+        let angle = &joint.position_rad;
+        let step_rad = Encoder::detect(angle, described).map_or(0.0, |encoder| encoder.step_rad);
+        let rate = |row: usize| (angle[row + 1] - angle[row]) / (time[row + 1] - time[row]) * median_step;
+        let changes: Vec<f64> = (0..time.len() - 1).map(rate).collect();
+        // Neighbours of a smooth motion change evenly.
+        let bends = changes.windows(3).map(|three| (three[0] - 2.0 * three[1] + three[2]).abs());
+        let noise = quantile(bends.collect(), 0.5) / (0.6745 * f64::sqrt(6.0));
+        for (row, three) in changes.windows(3).enumerate() {
+            let (mean, between) = (0.5 * (three[0] + three[2]), three[1]);
+            let is_fast = mean.abs() > (FAST_NOISE * noise).max(FAST_STEPS * step_rad)
+                && (three[0] - three[2]).abs() < STEADY * mean.abs();
+            if is_fast {
+                let jump = (between / mean).round();
+                let is_whole = (between / mean - jump).abs() < WHOLE * jump;
+                let found = if is_whole && jump <= LARGEST_JUMP { jump - 1.0 } else { 0.0 };
+                differ[row + 1] |= missing[row + 1].replace(found).is_some_and(|other| other != found);
+            }
+        }
+    }
+    let is_jump = |row: &usize| !differ[*row] && missing[*row].is_some_and(|missing| missing > 0.0);
+    let jumps: Vec<usize> = (0..time.len()).filter(is_jump).collect();
+    let first = jumps.first().filter(|_| jumps.len() >= LEAST_JUMPS)?;
+    let (mut lost, mut clock) = (0.0, Vec::with_capacity(time.len()));
+    for (row, stamp) in time.iter().enumerate() {
+        clock.push(stamp + lost * median_step);
+        lost += if is_jump(&row) { missing[row].unwrap_or(0.0) } else { 0.0 };
+    }
+    let errors = clock_errors(&clock, median_step);
+    let inertia = recording
+        .joints
+        .iter()
+        .map(|joint| inertia_error(&clock, &joint.position_rad, &errors, median_step, bandwidth_hz))
+        .fold(0.0, f64::max);
+    let share = lost / time.len() as f64;
+    Some(SampleFinding {
+        name: TIME_STAMPS,
+        file: recording.file.display().to_string(),
+        joint: None,
+        value: rms(errors.iter().copied()),
+        unit: "s",
+        sigma: None,
+        share,
+        // An inertia changes with the square of the clock.
+        refuses: inertia.max(2.0 * share) > LARGEST_SHARE,
+        text: format!(
+            "{lost:.0} rows are missing although t_s goes on, {:.2} % of all, first after {:.3} s: the leg seems to jump \
+             there. Stamp each row when it is measured, not by its number",
+            100.0 * share,
+            time[*first]
         ),
     })
 }

@@ -354,6 +354,22 @@ fn assumptions_that_fail_are_found_at_their_size() {
     }
 }
 
+#[test]
+fn a_joint_that_moves_one_way_is_named_where_parameters_are_not_determined() {
+    let mut swept = motion([0.0; 2], 1);
+    let rows = swept.position.rows_mut().enumerate();
+    rows.for_each(|(index, angles)| angles[1] = 0.1 * index as f64 / 500.0);
+    let question = question(vec![swept]);
+    let errors = errors(&question);
+    let values = [12.0.into(), 13.0.into()];
+    let undetermined =
+        FindingReport::judged("unexcited", "determined", None, values, Some("12 of 13".into()));
+    let cause_with = |findings: &[FindingReport]| cause::likely(&question, Some(&errors), &[], findings);
+    let cause = cause_with(&[undetermined]);
+    assert_eq!((cause.name, cause.joint), ("motion", Some(2)), "{}", cause.words);
+    assert_ne!(cause_with(&[]).name, "motion");
+}
+
 /// Something that no correction describes, and an offset that drifts beside it.
 #[test]
 fn a_cause_that_explains_less_than_half_is_not_named_alone() {

@@ -29,7 +29,7 @@ impl Screening {
         let screened = samples::screen(recordings, &described_rad, REACH_PERIODS / bandwidth_hz);
         for (recording, screened) in recordings.iter().zip(screened) {
             findings.extend(screened.findings);
-            findings.extend(stamps::examine(recording, bandwidth_hz));
+            findings.extend(stamps::examine(recording, &described_rad, bandwidth_hz));
             spans.push((recording.file.clone(), screened.spans));
         }
         Self { findings, spans }
