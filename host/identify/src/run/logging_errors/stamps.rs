@@ -12,7 +12,7 @@
 //! e_k     = stamp k minus the even clock, a straight line through each half second
 //! share   = var(qdd from e) / var(qdd),   var(qdd from e) = 2/5 (2 pi)^4 B^5 S      at most 0.4 %
 //! S       density of qd e at low frequency, from its means over 1 / 4B
-//! missing rows   an angle changes by n = 2 to 6 times the mean of its changes before and after, within n / 8,
+//! missing rows   an angle changes by n = 2 to 6 times the mean of its changes beside it, within n / 8,
 //!                in every joint that moves fast at once; three times or more
 //! ```
 //!
