@@ -75,7 +75,6 @@ pub(super) struct Base {
 pub(super) struct Direction {
     pub(super) name: String,
     pub(super) joint: Option<usize>,
-    pub(super) value: Option<f64>,
     pub(super) sigma: Option<f64>,
     pub(super) unit: String,
 }
