@@ -16,9 +16,10 @@ pub(super) const RIGHT_SIGMAS: f64 = 4.0;
 const ACCEPTED_SHARE: f64 = 0.05;
 
 /// When an acceptance is right.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) enum Accept {
     /// It is always wrong.
+    #[default]
     Never,
     /// Every parameter with a known truth is within [`RIGHT_SIGMAS`] of it.
     Near(Values),
@@ -30,7 +31,7 @@ pub(super) enum Accept {
 }
 
 /// What a case demands.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Expect {
     pub(super) accept: Accept,
     /// Whether a refusal is right.
@@ -157,19 +158,18 @@ impl Accept {
                 let (shift, name) =
                     largest_shift(&clean.found.base_parameters, &outcome.found.base_parameters);
                 let covers = |(name, joint, size): &(String, Option<usize>, f64)| {
-                    let found = outcome
-                        .found
-                        .directions
-                        .iter()
-                        .find(|found| found.name == *name && found.joint == *joint);
+                    let directions = outcome.found.directions.iter().filter(|found| found.name == *name);
+                    let mut own =
+                        directions.filter(|found| joint.is_none_or(|joint| found.joint == Some(joint)));
                     let to_si = |unit: &str| match unit {
                         "ms" => 1e-3,
                         "%" => 0.01,
                         "rad" => 1.0_f64.to_degrees(),
                         _ => 1.0,
                     };
-                    found.and_then(|found| Some(size.abs() < 3.0 * found.sigma? * to_si(&found.unit)))
-                        == Some(true)
+                    own.any(|found| {
+                        found.sigma.is_some_and(|sigma| size.abs() < 3.0 * sigma * to_si(&found.unit))
+                    })
                 };
                 let is_covered = !injected.is_empty() && injected.iter().all(covers);
                 (shift > HARMLESS_SIGMAS && !is_covered)

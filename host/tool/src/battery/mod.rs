@@ -15,6 +15,7 @@
 mod damage;
 mod dynamics;
 mod judge;
+mod matrix;
 mod outcome;
 mod random;
 
@@ -24,19 +25,16 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use scarab_base::error::ToolError;
-use scarab_base::table::Table;
 use scarab_identify::{LegFile, Recording};
 use scarab_rig::options::SimulationOptions;
 use scarab_rig::simulate::simulate;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
-use judge::{Accept, Expect, Judged, Named};
+use dynamics::Values;
+use judge::{Accept, Expect, Judged};
+pub use matrix::Battery;
 use outcome::{Outcome, Task};
 use random::Sample;
-
-/// Shares of errors within one and three sigma for honest sigmas, and the least number that shows them.
-const COVERAGE: [std::ops::RangeInclusive<f64>; 2] = [0.6..=0.8, 0.98..=1.0];
-const LEAST_ERRORS: usize = 100;
 
 /// Rows of `cases.toml`.
 #[derive(Debug, Deserialize)]
@@ -46,7 +44,7 @@ struct Rows {
     damage: Vec<Kind>,
     case: Vec<Row>,
     fault: Vec<Kind>,
-    truth: BTreeMap<String, BTreeMap<String, f64>>,
+    truth: BTreeMap<String, Values>,
 }
 
 /// Files, options and expectation of one replay.
@@ -95,6 +93,14 @@ struct Kind {
     hides_joint: bool,
 }
 
+impl Kind {
+    /// Causes that name it at this joint.
+    fn expect(&self, joint: Option<usize>) -> Expect {
+        let joint = joint.filter(|_| !self.hides_joint);
+        Expect { causes: self.causes.clone(), words: self.words.clone(), joint, ..Expect::default() }
+    }
+}
+
 /// Input of one case with what it demands; made when it runs.
 struct Trial {
     task: Task,
@@ -135,13 +141,6 @@ struct Clean {
     outcome: Arc<Outcome>,
 }
 
-/// Judged cases.
-#[derive(Debug, Serialize)]
-pub struct Battery {
-    cases: Vec<Judged>,
-    coverage: Vec<String>,
-}
-
 /// Path of a row; `None` if its environment variable is not set.
 fn path(text: &str) -> Option<PathBuf> {
     match text.split_once('/') {
@@ -168,21 +167,15 @@ impl Row {
             return Some(Task { training: vec![Default::default()], ..empty }.with(run.recordings.get(..1)?));
         }
         let paths = |files: &[String]| files.iter().map(|file| path(file)).collect::<Option<Vec<_>>>();
-        let leg = if self.leg.contains('/') {
-            path(&self.leg)?.to_string_lossy().into_owned()
-        } else {
-            self.leg.clone()
-        };
+        let leg = self.leg.contains('/').then(|| path(&self.leg));
+        let leg = leg.flatten().map_or(self.leg.clone(), |path| path.to_string_lossy().into_owned());
         Task::load(&leg, &paths(&self.files)?, &paths(&self.held_out)?, &self.options)
     }
 
     fn command(&self) -> String {
-        let held_out = if self.held_out.is_empty() {
-            String::new()
-        } else {
-            format!(" --validate {}", self.held_out.join(" "))
-        };
-        format!("replay {}{held_out} --leg {} {}", self.files.join(" "), self.leg, self.options)
+        let validate = if self.held_out.is_empty() { "" } else { " --validate " };
+        let [files, held_out] = [&self.files, &self.held_out].map(|files| files.join(" "));
+        format!("replay {files}{validate}{held_out} --leg {} {}", self.leg, self.options)
     }
 }
 
@@ -223,11 +216,8 @@ fn cases(selection: &Selection) -> Result<Vec<Case>, ToolError> {
             let clean = Arc::clone(&clean);
             let (name, kind) = (name(&row, size, joint), row.kind.clone());
             let joints = source.joints;
-            cases.push(Case {
-                name,
-                kind,
-                make: Box::new(move || damaged(&clean, &row, size, joint, joints)),
-            });
+            let make: Make = Box::new(move || damaged(&clean, &row, size, joint, joints));
+            cases.push(Case { name, kind, make });
         }
     }
     for row in rows.case.into_iter().filter(|row| selection.holds(&row.name)) {
@@ -288,26 +278,22 @@ fn damaged(
         "low_pass" => 1.0 / (std::f64::consts::TAU * size),
         _ => size * row.factor.unwrap_or(1.0),
     };
-    let touched = if row.kind == "gravity" {
-        vec![None]
-    } else {
-        damaged.iter().map(|joint| Some(joint + 1)).collect()
-    };
+    // Gravity, and a ratio of torques, are reported for one joint or for none.
+    let is_of_all = row.kind == "gravity" || row.hides_joint;
+    let touched = if is_of_all { vec![None] } else { damaged.iter().map(|joint| Some(joint + 1)).collect() };
     let touched = touched.into_iter().filter(|_| !row.direction.is_empty());
     let injected = touched.map(|joint| (row.direction.clone(), joint, value)).collect();
     let expect = Expect {
         accept: Accept::Clean { clean: Arc::clone(&clean.outcome), injected },
         refuses: !row.must_accept,
         names: true,
-        causes: row.causes.clone(),
-        words: row.words.clone(),
-        joint: joint.filter(|_| !row.hides_joint),
+        ..row.expect(joint)
     };
     Ok(Trial { task, expect, note: String::new() })
 }
 
 /// A case whose files and expectation its row states.
-fn stated(row: &Row, truth: &BTreeMap<String, f64>) -> Result<Trial, ToolError> {
+fn stated(row: &Row, truth: &Values) -> Result<Trial, ToolError> {
     let task =
         row.task().ok_or_else(|| ToolError::input(format!("{}: cannot be read", row.files.join(", "))))?;
     let expect = Expect {
@@ -322,15 +308,8 @@ fn stated(row: &Row, truth: &BTreeMap<String, f64>) -> Result<Trial, ToolError> 
 }
 
 /// The expectation of clean data.
-fn accepted(truth: BTreeMap<String, f64>) -> Expect {
-    Expect {
-        accept: Accept::Near(truth),
-        refuses: false,
-        names: false,
-        causes: vec![],
-        words: vec![],
-        joint: None,
-    }
+fn accepted(truth: Values) -> Expect {
+    Expect { accept: Accept::Near(truth), ..Expect::default() }
 }
 
 fn log(seed: u64) -> Result<Trial, ToolError> {
@@ -350,14 +329,8 @@ fn faulty(row: &Kind, seed: u64) -> Result<Trial, ToolError> {
     let mut sample = Sample::new(seed, row.least_joints, row.parallel)?;
     sample.inject(&row.kind, &row.sizes, seed);
     let (task, note, joint) = (sample.task(), sample.fault.clone(), sample.joint);
-    let expect = Expect {
-        accept: Accept::Torque(Box::new(sample)),
-        refuses: true,
-        names: false,
-        causes: row.causes.clone(),
-        words: row.words.clone(),
-        joint: joint.filter(|_| !row.hides_joint),
-    };
+    let accept = Accept::Torque(Box::new(sample));
+    let expect = Expect { accept, refuses: true, ..row.expect(joint) };
     Ok(Trial { task, expect, note })
 }
 
@@ -367,7 +340,7 @@ impl Case {
             (self.make)().map(|trial| Judged { note: trial.note, ..trial.expect.judge(&trial.task.run()) });
         let judged = judged.unwrap_or_else(|error| Judged {
             miss: Some(error.to_string()),
-            ..accepted(BTreeMap::new())
+            ..accepted(Values::new())
                 .judge(&Outcome { verdict: outcome::Verdict::BadInput, ..Outcome::default() })
         });
         Judged { name: self.name.clone(), kind: self.kind.clone(), ..judged }
@@ -387,109 +360,15 @@ pub fn list(selection: &Selection) -> Result<String, ToolError> {
 /// # Errors
 /// The table cannot be read, or a recording of a source is invalid.
 pub fn run(selection: &Selection) -> Result<Battery, ToolError> {
-    let cases: Vec<Judged> = cases(selection)?.par_iter().map(Case::run).collect();
-    let mut coverage = Vec::new();
-    for group in ["logs", "random"] {
-        let errors = cases.iter().filter(|case| case.kind == group).flat_map(|case| &case.errors);
-        let errors: Vec<f64> = errors.copied().collect();
-        if errors.len() < LEAST_ERRORS {
-            continue;
-        }
-        let share =
-            |limit: f64| errors.iter().filter(|error| **error < limit).count() as f64 / errors.len() as f64;
-        let within = [share(1.0), share(3.0)];
-        let is_honest = COVERAGE.iter().zip(within).all(|(range, share)| range.contains(&share));
-        coverage.push(format!(
-            "{group}: errors within one, three sigma: {:.1} %, {:.1} % of {}; largest {:.1}{}",
-            100.0 * within[0],
-            100.0 * within[1],
-            errors.len(),
-            errors.iter().copied().fold(0.0, f64::max),
-            if is_honest || group == "random" { "" } else { "; MISS" }
-        ));
-    }
-    Ok(Battery { cases, coverage })
-}
-
-impl Battery {
-    /// Whether a case or the coverage of sigma misses.
-    pub fn misses(&self) -> bool {
-        self.cases.iter().any(|case| case.miss.is_some())
-            || self.coverage.iter().any(|line| line.ends_with("MISS"))
-    }
-
-    /// Table by kind, and coverage of sigma.
-    pub fn matrix(&self) -> String {
-        let mut table = Table::default().label("kind").numbers([
-            "cases",
-            "accepted",
-            "with misfit",
-            "refused",
-            "bad input",
-            "named right",
-            "listed",
-            "unknown",
-            "named wrong",
-            "wrong acceptances",
-            "false refusals",
-            "misses",
-        ]);
-        let mut kinds: Vec<&str> = Vec::new();
-        for case in &self.cases {
-            if !kinds.contains(&case.kind.as_str()) {
-                kinds.push(&case.kind);
-            }
-        }
-        for kind in kinds.into_iter().map(Some).chain([None]) {
-            let count = |holds: &dyn Fn(&Judged) -> bool| {
-                let own = self.cases.iter().filter(|case| kind.is_none_or(|kind| case.kind == kind));
-                own.filter(|case| holds(case)).count().to_string()
-            };
-            let mut cells = vec![kind.unwrap_or("all").to_owned(), count(&|_| true)];
-            cells.extend(
-                ["accepted", "accepted with misfit", "refused", "bad input"]
-                    .map(|word| count(&|case| case.verdict == word)),
-            );
-            cells.extend(
-                [Named::Right, Named::Listed, Named::Unknown, Named::Wrong]
-                    .map(|named| count(&|case| case.named == named)),
-            );
-            cells.extend([
-                count(&|case| case.wrong_acceptance),
-                count(&|case| case.false_refusal),
-                count(&|case| case.miss.is_some()),
-            ]);
-            table.row(cells);
-        }
-        let coverage: String = self.coverage.iter().map(|line| format!("{line}\n")).collect();
-        format!("{}\n{coverage}", table.to_markdown())
-    }
-
-    /// Every miss in one line, with what repeats it.
-    pub fn failures(&self) -> String {
-        let line = |case: &Judged| {
-            let miss = case.miss.as_ref()?;
-            let is_generated =
-                ["logs/", "random/", "faults/"].iter().any(|group| case.name.starts_with(group));
-            let seed = case.name.rsplit('/').next().filter(|_| is_generated);
-            let seed = seed.map_or(String::new(), |seed| format!(" --seed {seed} --count 1"));
-            let found = [case.reasons.join(", "), case.cause.clone().unwrap_or_default()]
-                .map(|text| if text.is_empty() { "-".into() } else { text });
-            Some(format!(
-                "battery --kind {}{seed}: {miss}; {}: {}; cause {} ({})\n",
-                case.name, case.verdict, found[0], found[1], case.note
-            ))
-        };
-        self.cases.iter().filter_map(line).collect()
-    }
+    Ok(Battery::new(cases(selection)?.par_iter().map(Case::run).collect()))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Rows, damage, outcome};
+    use super::{Rows, Sample, damage, outcome};
 
     #[test]
-    fn every_row_of_the_table_is_known() {
+    fn every_row_of_the_table_changes_what_it_says() {
         let rows: Rows = outcome::table().expect("a table");
         for row in &rows.damage {
             let files = &mut [damage::tests::recording()];
@@ -498,6 +377,13 @@ mod tests {
         for row in rows.source.iter().chain(&rows.case) {
             assert!(row.truth.is_empty() || rows.truth.contains_key(&row.truth), "{}: truth", row.name);
             assert!(["", "accept", "refuse", "either"].contains(&row.expect.as_str()), "{}", row.name);
+        }
+        for row in &rows.fault {
+            let clean = Sample::new(5, row.least_joints, row.parallel).expect("a leg");
+            let mut sample = clean.clone();
+            sample.inject(&row.kind, &row.sizes, 1);
+            let [clean, faulty] = [clean, sample].map(|sample| sample.task());
+            assert!(clean.leg != faulty.leg || clean.training != faulty.training, "{}", row.kind);
         }
     }
 }

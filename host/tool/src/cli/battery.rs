@@ -54,5 +54,5 @@ pub(crate) fn run_battery(arguments: &BatteryArguments) -> Result<u8, ToolError>
         output::print(&battery.matrix())?;
     }
     output::print(&battery.failures())?;
-    Ok(if battery.misses() { EXIT_MISSES } else { EXIT_ACCEPTED })
+    Ok(if battery.misses { EXIT_MISSES } else { EXIT_ACCEPTED })
 }
