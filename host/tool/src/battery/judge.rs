@@ -86,10 +86,8 @@ impl Expect {
         let miss = match (is_accepted, named) {
             (true, _) => self.accept.fault(outcome),
             (false, _) if !self.refuses => Some("refused, must be accepted".into()),
-            (false, Named::Wrong) => Some(format!("named wrong, expected {}", self.causes.join(" or "))),
-            (false, Named::Unknown) if self.names => {
-                Some(format!("cause not named, expected {}", self.causes.join(" or ")))
-            }
+            (false, Named::Wrong) => Some(format!("named wrong, {}", self.due())),
+            (false, Named::Unknown) if self.names => Some(format!("not named, {}", self.due())),
             _ => None,
         };
         let errors = match &self.accept {
@@ -111,6 +109,13 @@ impl Expect {
         }
     }
 
+    /// Expected names in words.
+    fn due(&self) -> String {
+        let words = self.words.iter().map(|word| format!("`{word}`"));
+        let due: Vec<String> = self.causes.iter().cloned().chain(words).collect();
+        format!("expected {}", due.join(" or "))
+    }
+
     fn named(&self, outcome: &Outcome) -> Named {
         let is_cause = |name: &str, joint: Option<u64>| {
             let is_joint = self.joint.zip(joint).is_none_or(|(due, named)| due as u64 == named);
@@ -118,6 +123,7 @@ impl Expect {
         };
         match (outcome.verdict, &outcome.found.likely_cause) {
             (Verdict::Accepted | Verdict::Misfit, _) => Named::Nothing,
+            _ if self.causes.is_empty() && self.words.is_empty() => Named::Nothing,
             (Verdict::BadInput, _) if self.words.iter().any(|word| outcome.words.contains(word)) => {
                 Named::Right
             }
