@@ -73,7 +73,7 @@ const HOST: [(&str, &[&[&str]]); 4] = [
             &["faults", "traced"],
         ],
     ),
-    ("host/tool/src", &[&["eds", "excitation_constant", "live"], &["view"], &["cli"]]),
+    ("host/tool/src", &[&["battery", "eds", "excitation_constant", "live"], &["view"], &["cli"]]),
 ];
 
 /// Firmware modules that every other firmware module may use.

@@ -3,6 +3,7 @@
 mod adapter;
 pub mod arguments;
 pub(crate) mod assist;
+mod battery;
 mod commission;
 pub mod common;
 mod compare;
@@ -123,6 +124,9 @@ enum Command {
     /// Print torques and regressor of given states: rigid bodies only, CSV.
     #[command(after_help = "Example: cargo sim regressor --leg my-leg.toml --states states.csv")]
     Regressor(regressor::RegressorArguments),
+    /// Judge the verdict of `replay` on a table of cases.
+    #[command(hide = true, after_help = "Example: cargo sim battery --kind random --count 20")]
+    Battery(battery::BatteryArguments),
     /// Build the flash image of a leg and print its size (`cargo fw`).
     #[command(after_help = "Example: cargo fw --leg my-leg.toml")]
     Fw(image::FirmwareArguments),
@@ -222,6 +226,7 @@ fn run(command: &Command, stated: Vec<Argument>) -> Result<u8, ToolError> {
         Command::Assist(arguments) => assist::run(arguments),
         Command::Motor(arguments) => motor::run(arguments),
         Command::Regressor(arguments) => regressor::run(arguments),
+        Command::Battery(arguments) => battery::run_battery(arguments),
         Command::Fw(arguments) => image::firmware(arguments),
         Command::FlashLeg(arguments) => image::flash_leg(arguments),
         Command::Identify(arguments) => identify::run(arguments, stated),

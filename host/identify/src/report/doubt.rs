@@ -215,7 +215,7 @@ impl DirectionReport {
                 format!("angle of joint {joint}: {size} % too {}", if negative { "small" } else { "large" })
             }
             "torque_scale" => format!(
-                "torque of joint {joint}: {size} % too {} against joint 1",
+                "torque of joint {joint}: {size} % too {} against the others",
                 if negative { "small" } else { "large" }
             ),
             "spring" => format!(

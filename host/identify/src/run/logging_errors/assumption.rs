@@ -25,7 +25,7 @@ use crate::run::logging_errors::midway::{POINTS, is_after};
 use crate::run::logging_errors::regressor::Instant;
 use crate::run::logging_errors::rows::{Equations, RowSource};
 use crate::run::logging_errors::table::Table;
-use crate::run::logging_errors::{Question, Refitted};
+use crate::run::logging_errors::{NO_GRAVITY, Question, Refitted, no_gravity_words};
 
 /// Rates of a clock that are tried first.
 const RATES: [f64; 12] = [0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 2.5, 3.3, 5.0];
@@ -48,13 +48,7 @@ pub(crate) fn all(question: &Question, equations: &Equations) -> Vec<Refitted> {
     let zero = question.zero();
     let joints = equations.joints();
     let weightless = equations.regressor.with_gravity(&|_| Vector3::zeros());
-    let no_gravity = CauseReport {
-        name: "no_gravity",
-        words:
-            "the torque holds no weight: was gravity compensation subtracted? Log the torque of the motors"
-                .into(),
-        ..CauseReport::default()
-    };
+    let no_gravity = CauseReport { name: NO_GRAVITY, words: no_gravity_words(), ..CauseReport::default() };
     let mut found = vec![replaced(equations, no_gravity, equations.columns_of(&*weightless, &|_| {}))];
     found.extend((1..joints).map(|joint| {
         let cause = CauseReport {

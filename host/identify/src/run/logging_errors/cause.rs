@@ -14,6 +14,7 @@
 //! are certain too are listed as not distinguished.
 
 use scarab::ident::Test;
+use scarab_base::stats::rms;
 
 use crate::report::doubt::{CauseReport, DirectionReport, ReadAs, SampleFinding};
 use crate::report::findings::FindingReport;
@@ -23,18 +24,18 @@ use crate::run::logging_errors::corrections::{
 use crate::run::logging_errors::directions::CHANCE;
 use crate::run::logging_errors::midway::Midway;
 use crate::run::logging_errors::refused::{
-    HALF, Refused, Tried, UNKNOWN, WEAKER, changed_midway, quality, refit,
+    HALF, Refused, Tried, UNKNOWN, WEAKER, are_close, changed_midway, quality, refit,
 };
 use crate::run::logging_errors::samples::SATURATION;
-use crate::run::logging_errors::{LoggingErrors, Question, assumption, lag, sample_cause};
+use crate::run::logging_errors::{LoggingErrors, NO_GRAVITY, Question, assumption, lag, sample_cause};
 
-/// Misfits closer than this ratio count as equal: the simpler correction is named.
-const EQUAL: f64 = 1.1;
 /// Misfits closer than this ratio are those of mirrored legs.
 const MIRRORED: f64 = 1.001;
 
 /// Scale between joints, percent, from which a torque is not in mN m.
 const OTHER_SCALE_PERCENT: f64 = 40.0;
+/// Mean change over the time near zero, over the width of that band, from which a torque is slow there.
+const SLOW: f64 = 2.5;
 /// Speed from which a joint moves, rad/s.
 const MOVING_RADPS: f64 = 0.03;
 /// Share of its largest value at which a torque counts as zero, and how often one without sign returns there.
@@ -54,7 +55,9 @@ pub(crate) fn likely(
     if let Some(finding) = samples.iter().find(|finding| finding.refuses) {
         return sample_cause(finding);
     }
-    if let Some(cause) = without_torque(findings).or_else(|| motionless(findings)) {
+    let found =
+        without_torque(findings).or_else(|| without_weight(findings)).or_else(|| motionless(findings));
+    if let Some(cause) = found {
         return cause;
     }
     let Some(errors) = errors else { return excluded(samples).unwrap_or_else(unknown) };
@@ -77,6 +80,9 @@ pub(crate) fn likely(
         _ => (question, errors),
     };
     let refused = Refused::new(question, errors);
+    if let Some(cause) = refused.is_alien().then(|| per_mille(question)).flatten() {
+        return cause;
+    }
     let mut tried: Vec<_> =
         corrections(question).iter().filter_map(|correction| refit(question, correction)).collect();
     // Before the delays, because a low-pass is tried only where it fits clearly better than a delay.
@@ -89,20 +95,18 @@ pub(crate) fn likely(
     tried.retain(|tried| tried.quality.sound && tried.significance > WEAKER);
     let alone = |least: f64| {
         let all = tried.iter().filter(|tried| tried.significance > least && refused.is_named_alone(tried));
-        nearest(all.cloned().collect())
+        nearest(all.cloned().collect(), |best, other| refused.are_equal(best, other))
     };
     let Some(mut best) = alone(CHANCE).or_else(|| alone(WEAKER)) else {
         return unsigned(question, errors)
             .or_else(|| excluded(samples))
             .unwrap_or_else(|| refused.unknown(tried));
     };
-    let alike: Vec<String> = tried
+    let alike: Vec<CauseReport> = tried
         .iter()
         .filter(|other| other.significance > CHANCE && other.cause.name != best.cause.name)
-        .filter(|other| {
-            refused.is_named_alone(other) && other.quality.remaining() <= EQUAL * best.quality.remaining()
-        })
-        .map(|other| subject(&other.cause))
+        .filter(|other| refused.is_named_alone(other) && refused.are_equal(&best, other))
+        .map(|other| other.cause.clone())
         .collect();
     if best.cause.explained.known().is_some() {
         best.cause.words += &format!(
@@ -111,9 +115,11 @@ pub(crate) fn likely(
         );
     }
     if !alike.is_empty() {
-        best.cause.words += &format!("; not distinguished from {}", alike.join(", "));
+        let subjects: Vec<String> = alike.iter().map(subject).collect();
+        best.cause.words += &format!("; not distinguished from {}", subjects.join(", "));
+        best.cause.possible = alike;
     }
-    beyond_unit(question, best.cause)
+    best.cause
 }
 
 /// Name and joint of a cause.
@@ -122,7 +128,8 @@ fn subject(cause: &CauseReport) -> String {
     cause.joint.map_or(name.clone(), |joint| format!("{name} of joint {joint}"))
 }
 
-/// A torque that comes back to zero again and again and never crosses it, as a magnitude does.
+/// A torque that returns to zero again and again and never crosses it, as fast as it changes elsewhere. A torque
+/// of one sign touches zero slowly.
 fn unsigned(question: &Question, errors: &LoggingErrors) -> Option<CauseReport> {
     // A torque of one sign that the model explains is that of such a motion.
     let is_misfit =
@@ -135,7 +142,11 @@ fn unsigned(question: &Question, errors: &LoggingErrors) -> Option<CauseReport> 
         let zero = NEAR_ZERO * (high - low);
         let near: Vec<bool> = torques.iter().map(|torque| torque.abs() < zero).collect();
         let returns = near.windows(2).filter(|pair| !pair[0] && pair[1]).count();
-        (low > -zero || high < zero) && returns >= LEAST_RETURNS
+        let samples = near.iter().filter(|near| **near).count() as f64;
+        let change = rms(torques.windows(2).map(|pair| pair[1] - pair[0]));
+        (low > -zero || high < zero)
+            && returns >= LEAST_RETURNS
+            && samples * change < SLOW * 2.0 * zero * returns as f64
     })?;
     Some(CauseReport {
         name: "unsigned_torque",
@@ -148,11 +159,9 @@ fn unsigned(question: &Question, errors: &LoggingErrors) -> Option<CauseReport> 
     })
 }
 
-/// A torque in mN m whose scales then differ between the joints is in another unit: a motor's own.
-fn beyond_unit(question: &Question, cause: CauseReport) -> CauseReport {
-    if cause.reads != [ReadAs::MillinewtonMetres] {
-        return cause;
-    }
+/// A torque in another unit for each joint, as in per mille of each motor's rated torque: in mN m its scale
+/// differs between the joints, which explains half of the misfit.
+fn per_mille(question: &Question) -> Option<CauseReport> {
     let correction = millinewton_metres();
     let motions = question.motions.iter().map(|motion| corrected(question, motion, &correction)).collect();
     let smaller = Question {
@@ -161,24 +170,24 @@ fn beyond_unit(question: &Question, cause: CauseReport) -> CauseReport {
         sigma: question.sigma.iter().map(|sigma| sigma / 1e3).collect(),
         ..question.clone()
     };
-    let errors = LoggingErrors::fit(&smaller).ok().flatten();
-    let mut other = errors.iter().flat_map(|errors| &errors.directions);
+    let errors = LoggingErrors::fit(&smaller).ok().flatten()?;
     let is_other = |found: &&DirectionReport| {
         found.name == "torque_scale"
-            && !found.passed
             && found.value.known().is_some_and(|size| size.abs() > OTHER_SCALE_PERCENT)
     };
-    let Some(scale) = other.find(is_other) else {
-        return cause;
+    let scales: Vec<String> = errors.directions.iter().filter(is_other).map(DirectionReport::words).collect();
+    let refused = Refused::new(&smaller, &errors);
+    let explains = |tried: &Tried| {
+        tried.cause.name == "torque_scale" && tried.quality.sound && refused.explained(tried) > HALF
     };
-    CauseReport {
+    (!scales.is_empty() && refused.directions().iter().any(explains)).then(|| CauseReport {
+        name: correction.name,
         words: format!(
             "is the torque in per mille of each motor's rated torque (CiA 402, object 6077)? Read in mN m, {}",
-            scale.words()
+            scales.join("; ")
         ),
-        reads: Vec::new(),
-        ..cause
-    }
+        ..CauseReport::default()
+    })
 }
 
 /// A torque that is always zero as the cause.
@@ -190,6 +199,12 @@ fn without_torque(findings: &[FindingReport]) -> Option<CauseReport> {
         words: format!("{}: is the column the measured torque?", finding.words),
         ..CauseReport::default()
     })
+}
+
+/// A torque without weight as the cause.
+fn without_weight(findings: &[FindingReport]) -> Option<CauseReport> {
+    let finding = findings.iter().find(|finding| !finding.passed && finding.test == NO_GRAVITY)?;
+    Some(CauseReport { name: NO_GRAVITY, words: finding.words.clone(), ..CauseReport::default() })
 }
 
 /// A joint that hardly moved as the cause.
@@ -274,13 +289,15 @@ pub(crate) fn in_degrees(question: &Question, errors: &LoggingErrors) -> Option<
     });
     let tried = candidates.filter_map(|correction| refit(question, &correction));
     let is_better = |tried: &Tried| tried.quality.sound && tried.quality.remaining() < 0.5 * here.remaining();
-    nearest(tried.filter(is_better).collect()).map(|tried| tried.cause)
+    nearest(tried.filter(is_better).collect(), are_close).map(|tried| tried.cause)
 }
 
-/// Cause that leaves least of the misfit; of nearly equal ones the simpler, of one name the better.
-fn nearest(mut passing: Vec<Tried>) -> Option<Tried> {
-    let least = passing.iter().map(|tried| tried.quality.remaining()).fold(f64::INFINITY, f64::min);
-    passing.retain(|tried| tried.quality.remaining() <= EQUAL * least);
+/// Cause that leaves least of the misfit; of equal ones the simpler, of one name the better.
+fn nearest(mut passing: Vec<Tried>, are_equal: impl Fn(&Tried, &Tried) -> bool) -> Option<Tried> {
+    let remaining =
+        |one: &&Tried, other: &&Tried| one.quality.remaining().total_cmp(&other.quality.remaining());
+    let least = passing.iter().min_by(remaining)?.clone();
+    passing.retain(|tried| are_equal(&least, tried));
     let name = passing.first()?.cause.name;
     passing.retain(|tried| tried.cause.name == name);
     passing.sort_by(|one, other| one.quality.remaining().total_cmp(&other.quality.remaining()));

@@ -4,7 +4,7 @@
 //! ```text
 //! delay j           torque_j(t + d) = Y_j p                           torque of joint j is d late
 //! encoder_scale j   Y(q_j / (1 + d)) p, about the joint's zero        angle of joint j is logged too large
-//! torque_scale j    torque_j = (1 + d) Y_j p                          torque of joint j against joint 1
+//! torque_scale j    torque_j = (1 + d) Y_j p                          torque of joint j against the others
 //! gravity           Y with gravity turned back by d about axis 1      gravity of the leg file is turned by d
 //! spring j          torque_j = Y_j p + d q_j                          a spring beside the drive of joint j
 //! offset_drift j    torque_j = Y_j p + d s                            s from -0.5 to 0.5 over each recording
@@ -78,7 +78,7 @@ pub enum Kind {
     Delay(usize),
     /// Scale of a joint's angle.
     EncoderScale(usize),
-    /// Scale of a joint's torque against that of the first.
+    /// Scale of a joint's torque against those of the others.
     TorqueScale(usize),
     /// Direction of gravity.
     Gravity,
@@ -108,7 +108,9 @@ impl Kind {
         let drifts = [Drifting::Offset, Drifting::Torque, Drifting::Friction];
         let drifts =
             drifts.into_iter().flat_map(|what| (0..joints).map(move |joint| Self::Drift(what, joint)));
-        let plain = delays.chain(scales).chain((1..joints).map(Self::TorqueScale)).chain([Self::Gravity]);
+        // Of two joints, the scale of one is the inverse of the other's.
+        let first = if joints > 2 { 0 } else { 1 };
+        let plain = delays.chain(scales).chain((first..joints).map(Self::TorqueScale)).chain([Self::Gravity]);
         plain.chain(springs).chain(drifts).collect()
     }
 
@@ -139,9 +141,9 @@ impl Kind {
     }
 
     /// Whether the same error of several joints is tried at once: it changes the equations of its joint only.
-    /// A delay of all joints is one error with one value.
+    /// A delay of all joints is one error with one value; a scale of all torques is none.
     pub(crate) fn is_combined(self) -> bool {
-        !matches!(self, Self::EncoderScale(_) | Self::Gravity | Self::Delay(_))
+        !matches!(self, Self::EncoderScale(_) | Self::Gravity | Self::Delay(_) | Self::TorqueScale(0))
     }
 
     /// Unit of reports and the factor to it.

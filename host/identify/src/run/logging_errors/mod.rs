@@ -50,7 +50,7 @@ use scarab_base::number::Number;
 
 use crate::report::doubt::{CauseReport, DirectionReport, DoubtReport, SampleFinding};
 use crate::report::findings::FindingReport;
-use directions::{Directions, Found};
+use directions::{CHANCE, Directions, Found};
 use encoder::{Bias, Encoders, LARGEST_NOISE, LARGEST_SHARE};
 use midway::Midway;
 use regressor::Regressor;
@@ -189,6 +189,9 @@ pub(crate) struct LoggingErrors {
     pub(crate) encoder: Option<Bias>,
     /// Bandwidth at which the steps are negligible, Hz; only where they refuse.
     better_hz: Option<f64>,
+    /// Standard deviations by which the leg's weight shows in the torque; `None` for a leg without weight, or
+    /// of one joint.
+    weight: Option<f64>,
 }
 
 /// Standard deviation of a parameter in its parts.
@@ -274,6 +277,7 @@ impl LoggingErrors {
             }
         }
         let midway = midway::find(&equations);
+        let weight = weight(&equations);
         Ok(Some(Self {
             equations,
             found,
@@ -284,6 +288,7 @@ impl LoggingErrors {
             sigma,
             encoder,
             better_hz,
+            weight,
         }))
     }
 
@@ -299,6 +304,11 @@ impl LoggingErrors {
             let failure = bias.refuses().then(|| self.encoder_words(bias));
             let values = [value, limit].map(Number::from);
             FindingReport::judged("input", "encoder_steps", Some(joint + 1), values, failure)
+        }));
+        findings.extend(self.weight.map(|weight| {
+            let failure = (weight < CHANCE).then(no_gravity_words);
+            let values = [weight, CHANCE].map(Number::from);
+            FindingReport::judged("input", NO_GRAVITY, None, values, failure)
         }));
         findings.extend(self.midway.as_ref().map(|midway| {
             let failure = midway.refuses().then(|| midway_words(midway));
@@ -340,6 +350,27 @@ impl LoggingErrors {
             ..DoubtReport::default()
         }
     }
+}
+
+/// Standard deviations by which the weight shows: the misfit without gravity over that with it. The torque of
+/// one joint may be balanced.
+fn weight(equations: &Equations) -> Option<f64> {
+    let weightless = equations.regressor.with_gravity(&|_| Vector3::zeros());
+    let columns = equations.columns_of(&*weightless, &|_| {});
+    let [plain, without] =
+        [&equations.columns, &columns].map(|columns| equations.fit(columns, &equations.torque, false).cost);
+    let has_weight = equations.joints() > 1 && columns != equations.columns;
+    has_weight.then(|| (without - plain).max(0.0).sqrt())
+}
+
+/// Finding and cause of a torque without weight.
+pub(crate) const NO_GRAVITY: &str = "no_gravity";
+
+/// Sentence about a torque without weight.
+pub(crate) fn no_gravity_words() -> String {
+    "the torque holds no weight: was gravity compensation subtracted? Log the torque of the motors; of a balanced leg, \
+     state `gravity = [0, 0, 0]` in the leg file"
+        .into()
 }
 
 /// Finding about samples, for the verdict.

@@ -19,8 +19,12 @@ const PLAUSIBLE_RATIO: f64 = 30.0;
 const BEYOND: f64 = 0.3;
 /// Share of the misfit beyond the noise that a cause explains which is named alone.
 pub(super) const HALF: f64 = 0.5;
+/// Share for samples that are read in another way, which leaves no part of an error.
+const EXACT: f64 = 0.8;
 /// Share of the misfit beyond the noise that a possible cause explains.
 const TENTH: f64 = 0.1;
+/// Misfits closer than this ratio count as equal: the simpler correction is named.
+const EQUAL: f64 = 1.1;
 /// Largest number of possible causes that are listed.
 const LISTED: usize = 3;
 /// Misfit over the torque up to which one correction may be all that is wrong.
@@ -52,6 +56,8 @@ pub(super) struct Tried {
     pub(super) quality: Quality,
     /// Size of the error over its standard deviation; infinite without one.
     pub(super) significance: f64,
+    /// Whether the samples are read in another way, without a value to fit.
+    is_exact: bool,
     /// Whether a finding refuses the recording for it.
     refuses: bool,
     /// Whether the same error of another joint cannot be distinguished.
@@ -135,9 +141,22 @@ impl<'a> Refused<'a> {
         shares.max_by(|one, other| one.1.total_cmp(&other.1)).unwrap_or_default()
     }
 
-    /// Whether a cause is named alone. A torque unlike the prior's shows an error whatever else is wrong.
+    /// Whether a cause is named alone. A torque unlike the prior's shows an error whatever else is wrong. Samples
+    /// that are read in another way must fit as well as the refused leg.
     pub(super) fn is_named_alone(&self, tried: &Tried) -> bool {
-        self.explained(tried) >= HALF || !self.agrees
+        let fits = tried.quality.remaining() < SMALL_MISFIT.max(EQUAL * self.quality.remaining());
+        let (least, fits) = if tried.is_exact { (EXACT, fits) } else { (HALF, true) };
+        fits && (self.explained(tried) >= least || !self.agrees)
+    }
+
+    /// Whether the torque is unlike the prior's.
+    pub(super) fn is_alien(&self) -> bool {
+        !self.agrees
+    }
+
+    /// Whether two corrections explain the misfit alike, and leave alike of it.
+    pub(super) fn are_equal(&self, one: &Tried, other: &Tried) -> bool {
+        are_close(one, other) && (self.explained(one) - self.explained(other)).abs() < TENTH
     }
 
     pub(super) fn tried(&self, refitted: Refitted) -> Tried {
@@ -145,7 +164,8 @@ impl<'a> Refused<'a> {
         let sound = is_sound(self.question, &values[..self.sigma.len()], &self.sigma)
             && agrees(self.question, &self.errors.equations, &columns, &torque);
         let quality = Quality { left: self.left(&values, &columns, &torque), sound };
-        let mut tried = Tried { cause, quality, significance, refuses: false, is_shared: false };
+        let mut tried =
+            Tried { cause, quality, significance, is_exact: false, refuses: false, is_shared: false };
         tried.cause.explained = self.explained(&tried).into();
         tried
     }
@@ -159,6 +179,7 @@ impl<'a> Refused<'a> {
             cause: changed_midway(midway),
             quality: Quality { left, sound: true },
             significance: f64::INFINITY,
+            is_exact: false,
             refuses: true,
             is_shared: false,
         }
@@ -292,7 +313,14 @@ pub(super) fn refit(question: &Question, correction: &Correction) -> Option<Trie
         reads: correction.reads.clone(),
         ..CauseReport::default()
     };
-    Some(Tried { cause, quality, significance: f64::INFINITY, refuses: false, is_shared: false })
+    Some(Tried {
+        cause,
+        quality,
+        significance: f64::INFINITY,
+        is_exact: true,
+        refuses: false,
+        is_shared: false,
+    })
 }
 
 /// Mean square torque of each joint.
@@ -352,6 +380,12 @@ fn agrees(question: &Question, equations: &Equations, columns: &Table, torque: &
             let ratio = (measured / expected.max(1e-300)).sqrt();
             (1.0 / PLAUSIBLE_RATIO..PLAUSIBLE_RATIO).contains(&ratio)
         })
+}
+
+/// Whether two corrections leave nearly the same misfit.
+pub(super) fn are_close(one: &Tried, other: &Tried) -> bool {
+    let [one, other] = [one, other].map(|tried| tried.quality.remaining());
+    one.max(other) <= EQUAL * one.min(other)
 }
 
 /// A gain that changes midway.

@@ -123,6 +123,7 @@ fn meaning(test: &str) -> (bool, &str) {
         "torque_drift" => (false, "change of the torque's gain over a recording, %"),
         "friction_drift" => (false, "change of the friction over a recording, %"),
         "gravity" => (false, "angle by which gravity seems turned, degrees"),
+        "no_gravity" => (true, "sigma by which the leg's weight shows"),
         "changed_midway" => (false, "change of the torque's gain midway"),
         "zero_rows" => (false, "time of the first row of zeros, s"),
         "saturation" => (false, "limit of the recorded torque, N m"),
