@@ -25,7 +25,7 @@ const COMPARED: usize = 1500;
 pub(super) struct Sample {
     /// True values of the parameters.
     pub(super) truth: Values,
-    /// Number and size of the fault's joint, in words.
+    /// Size of the leg, noise and fault in words.
     pub(super) fault: String,
     /// Faulted joint, from 1.
     pub(super) joint: Option<usize>,
@@ -76,6 +76,12 @@ impl Sample {
             Recording { file: "random.csv".into(), joints: series.collect(), joints_in_file: joints, time_s };
         let fault = format!("{joints} joints, {rate_hz} Hz, {duration_s:.0} s, noise {:.1} %", 100.0 * noise);
         Ok(Self { truth, fault, joint: None, stated: leg.clone(), leg, states, torques, recorded })
+    }
+
+    /// What the leg file states, and what is recorded.
+    #[cfg(test)]
+    pub(super) fn files(&self) -> (&LegFile, &Recording) {
+        (&self.stated, &self.recorded)
     }
 
     /// Files and options of the replay.
