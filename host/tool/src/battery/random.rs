@@ -74,7 +74,11 @@ impl Sample {
         });
         let recorded =
             Recording { file: "random.csv".into(), joints: series.collect(), joints_in_file: joints, time_s };
-        let fault = format!("{joints} joints, {rate_hz} Hz, {duration_s:.0} s, noise {:.1} %", 100.0 * noise);
+        let prior = if leg.joints[0].prior.is_some() { "prior" } else { "no prior" };
+        let axes = if leg.joints.iter().any(|joint| joint.dh.alpha != 0.0) { ", abduction" } else { "" };
+        let percent = 100.0 * noise;
+        let fault =
+            format!("{joints} joints{axes}, {prior}, {rate_hz} Hz, {duration_s:.0} s, noise {percent:.1} %");
         Ok(Self { truth, fault, joint: None, stated: leg.clone(), leg, states, torques, recorded })
     }
 
