@@ -18,7 +18,7 @@ const ACCEPTED_SHARE: f64 = 0.05;
 /// When an acceptance is right.
 #[derive(Clone, Debug, Default)]
 pub(super) enum Accept {
-    /// It is always wrong.
+    /// An acceptance is always wrong.
     #[default]
     Never,
     /// Every parameter with a known truth is within [`RIGHT_SIGMAS`] of it.
@@ -85,7 +85,11 @@ impl Expect {
         let is_accepted = outcome.is_accepted();
         let miss = match (is_accepted, named) {
             (true, _) => self.accept.fault(outcome),
-            (false, _) if !self.refuses => Some("refused, must be accepted".into()),
+            (false, _) if !self.refuses => {
+                let failed = outcome.found.findings.iter().filter(|finding| !finding.passed);
+                let words: Vec<&str> = failed.map(|finding| finding.words.as_str()).collect();
+                Some(format!("refused, must be accepted: {}", words.join("; ")))
+            }
             (false, Named::Wrong) => Some(format!("named wrong, {}", self.due())),
             (false, Named::Unknown) if self.names => Some(format!("not named, {}", self.due())),
             _ => None,
@@ -185,8 +189,8 @@ impl Accept {
     }
 }
 
-/// Largest distance between two fits in sigma of the second, and its parameter. A parameter of one fit only is
-/// zero in the other; a sum of other terms is not the same parameter.
+/// Largest distance between two fits in sigma of the second, and its parameter. A parameter of one fit only
+/// is zero in the other; a sum of other terms is not the same parameter.
 fn largest_shift<'a>(clean: &'a [Base], found: &'a [Base]) -> (f64, &'a str) {
     let known = |bases: &'a [Base]| bases.iter().filter(|base| base.estimate().is_some());
     let only_clean = known(clean).filter(|base| known(found).all(|other| other.name != base.name));

@@ -50,6 +50,15 @@ pub(super) struct Found {
     pub(super) base_parameters: Vec<Base>,
     #[serde(default)]
     pub(super) directions: Vec<Direction>,
+    #[serde(default)]
+    pub(super) findings: Vec<Finding>,
+}
+
+/// One test of the verdict.
+#[derive(Clone, Debug, Deserialize)]
+pub(super) struct Finding {
+    pub(super) passed: bool,
+    pub(super) words: String,
 }
 
 /// A named cause, and others that explain the misfit as well.

@@ -25,7 +25,7 @@ const COMPARED: usize = 1500;
 pub(super) struct Sample {
     /// True values of the parameters.
     pub(super) truth: Values,
-    /// Number and size of the fault's joint, in words.
+    /// Size of the leg, noise and fault in words.
     pub(super) fault: String,
     /// Faulted joint, from 1.
     pub(super) joint: Option<usize>,
@@ -74,8 +74,18 @@ impl Sample {
         });
         let recorded =
             Recording { file: "random.csv".into(), joints: series.collect(), joints_in_file: joints, time_s };
-        let fault = format!("{joints} joints, {rate_hz} Hz, {duration_s:.0} s, noise {:.1} %", 100.0 * noise);
+        let prior = if leg.joints[0].prior.is_some() { "prior" } else { "no prior" };
+        let axes = if leg.joints.iter().any(|joint| joint.dh.alpha != 0.0) { ", abduction" } else { "" };
+        let percent = 100.0 * noise;
+        let fault =
+            format!("{joints} joints{axes}, {prior}, {rate_hz} Hz, {duration_s:.0} s, noise {percent:.1} %");
         Ok(Self { truth, fault, joint: None, stated: leg.clone(), leg, states, torques, recorded })
+    }
+
+    /// What the leg file states, and what is recorded.
+    #[cfg(test)]
+    pub(super) fn files(&self) -> (&LegFile, &Recording) {
+        (&self.stated, &self.recorded)
     }
 
     /// Files and options of the replay.
