@@ -11,8 +11,11 @@ use crate::battery::judge::{Judged, Named};
 const COVERAGE: [RangeInclusive<f64>; 2] = [0.6..=0.8, 0.98..=1.0];
 const LEAST_ERRORS: usize = 100;
 
+/// Title, and which cases count.
+type Column = (&'static str, fn(&Judged) -> bool);
+
 /// Columns of the table, and the cases that they count.
-const COLUMNS: [(&str, fn(&Judged) -> bool); 12] = [
+const COLUMNS: [Column; 12] = [
     ("cases", |_| true),
     ("accepted", |case| case.verdict == "accepted"),
     ("with misfit", |case| case.verdict == "accepted with misfit"),

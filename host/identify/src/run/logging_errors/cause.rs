@@ -128,8 +128,8 @@ fn subject(cause: &CauseReport) -> String {
     cause.joint.map_or(name.clone(), |joint| format!("{name} of joint {joint}"))
 }
 
-/// A torque that returns to zero again and again and never crosses it, as fast as it changes elsewhere. A torque
-/// of one sign touches zero slowly.
+/// A torque that returns to zero again and again and never crosses it, as fast as it changes elsewhere. A
+/// torque of one sign touches zero slowly.
 fn unsigned(question: &Question, errors: &LoggingErrors) -> Option<CauseReport> {
     // A torque of one sign that the model explains is that of such a motion.
     let is_misfit =

@@ -108,7 +108,7 @@ impl Kind {
         let drifts = [Drifting::Offset, Drifting::Torque, Drifting::Friction];
         let drifts =
             drifts.into_iter().flat_map(|what| (0..joints).map(move |joint| Self::Drift(what, joint)));
-        // Of two joints, the scale of one is the inverse of the other's.
+        // The scale of one of two joints is the inverse of the other's.
         let first = if joints > 2 { 0 } else { 1 };
         let plain = delays.chain(scales).chain((first..joints).map(Self::TorqueScale)).chain([Self::Gravity]);
         plain.chain(springs).chain(drifts).collect()

@@ -141,8 +141,8 @@ impl<'a> Refused<'a> {
         shares.max_by(|one, other| one.1.total_cmp(&other.1)).unwrap_or_default()
     }
 
-    /// Whether a cause is named alone. A torque unlike the prior's shows an error whatever else is wrong. Samples
-    /// that are read in another way must fit as well as the refused leg.
+    /// Whether a cause is named alone. A torque unlike the prior's shows an error whatever else is wrong.
+    /// Samples that are read in another way must fit as well as the refused leg.
     pub(super) fn is_named_alone(&self, tried: &Tried) -> bool {
         let fits = tried.quality.remaining() < SMALL_MISFIT.max(EQUAL * self.quality.remaining());
         let (least, fits) = if tried.is_exact { (EXACT, fits) } else { (HALF, true) };
