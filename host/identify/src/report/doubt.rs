@@ -8,7 +8,7 @@ use crate::report::findings::FindingReport;
 /// Estimated errors of the logging chain of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DoubtReport {
-    /// Most likely reason of a refusal; `null` where nothing was refused.
+    /// Most likely reason of a refusal, or of an accepted misfit; `null` where there is none.
     pub likely_cause: Option<CauseReport>,
     /// Every direction, whatever its value.
     pub(crate) directions: Vec<DirectionReport>,
@@ -94,7 +94,7 @@ impl RecordingsReport {
     }
 }
 
-/// Most likely reason of a refusal.
+/// Most likely reason of a refusal, or of a misfit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CauseReport {
     /// A word of the closed list.
@@ -293,7 +293,7 @@ impl CauseReport {
     }
 
     /// Name and sentence.
-    pub(crate) fn named(&self) -> String {
+    pub fn named(&self) -> String {
         let name = format!("{}: ", self.name.replace('_', " "));
         format!("{name}{}", self.words.strip_prefix(&name).unwrap_or(&self.words))
     }

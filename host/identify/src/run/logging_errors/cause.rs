@@ -85,23 +85,49 @@ pub(crate) fn likely(
     }
     let mut tried: Vec<_> =
         corrections(question).iter().filter_map(|correction| refit(question, correction)).collect();
-    // Before the delays, because a low-pass is tried only where it fits clearly better than a delay.
-    tried.extend(lag::all(&errors.equations).into_iter().map(|lag| refused.tried(lag)));
+    tried.extend(fitted(&refused));
+    tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
+    match named(&refused, &mut tried) {
+        Some(best) => best.cause,
+        None => {
+            unsigned(question, errors).or_else(|| excluded(samples)).unwrap_or_else(|| refused.unknown(tried))
+        }
+    }
+}
+
+/// Explains the misfit of an accepted leg: the error that is named alone, and the shift of each parameter when
+/// it is fitted.
+pub(crate) fn of_misfit(question: &Question, errors: &LoggingErrors) -> Option<(CauseReport, Vec<f64>)> {
+    let refused = Refused::new(question, errors);
+    let best = named(&refused, &mut fitted(&refused))?;
+    let all = &errors.equations;
+    let plain = all.fit(&all.columns, &all.torque, false).values;
+    let shift = best.values.iter().zip(&plain).map(|(with, without)| with - without).collect();
+    Some((best.cause, shift))
+}
+
+/// Errors that are fitted beside the parameters. Delays of all joints come first, because a low-pass is tried
+/// only where it fits clearly better than a delay.
+fn fitted(refused: &Refused<'_>) -> Vec<Tried> {
+    let (question, errors) = (refused.question, refused.errors);
+    let mut tried: Vec<Tried> =
+        lag::all(&errors.equations).into_iter().map(|lag| refused.tried(lag)).collect();
     tried.extend(refused.directions());
     tried.extend(assumption::all(question, &errors.equations).into_iter().map(|other| refused.tried(other)));
     let midway = errors.midway.as_ref().filter(|midway| midway.refuses());
     tried.extend(midway.map(|midway| refused.midway(midway)));
-    tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
+    tried
+}
+
+/// The correction that explains the misfit, with those that are not distinguished from it. Drops corrections
+/// that leave no possible leg or are chance.
+fn named(refused: &Refused<'_>, tried: &mut Vec<Tried>) -> Option<Tried> {
     tried.retain(|tried| tried.quality.sound && tried.significance > WEAKER);
     let alone = |least: f64| {
         let all = tried.iter().filter(|tried| tried.significance > least && refused.is_named_alone(tried));
         nearest(all.cloned().collect(), |best, other| refused.are_equal(best, other))
     };
-    let Some(mut best) = alone(CHANCE).or_else(|| alone(WEAKER)) else {
-        return unsigned(question, errors)
-            .or_else(|| excluded(samples))
-            .unwrap_or_else(|| refused.unknown(tried));
-    };
+    let mut best = alone(CHANCE).or_else(|| alone(WEAKER))?;
     let alike: Vec<CauseReport> = tried
         .iter()
         .filter(|other| other.significance > CHANCE && other.cause.name != best.cause.name)
@@ -119,7 +145,7 @@ pub(crate) fn likely(
         best.cause.words += &format!("; not distinguished from {}", subjects.join(", "));
         best.cause.possible = alike;
     }
-    best.cause
+    Some(best)
 }
 
 /// Name and joint of a cause.

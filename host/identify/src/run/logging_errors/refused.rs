@@ -54,6 +54,8 @@ impl Quality {
 pub(super) struct Tried {
     pub(super) cause: CauseReport,
     pub(super) quality: Quality,
+    /// All parameters beside the error; empty where the samples are read in another way.
+    pub(super) values: Vec<f64>,
     /// Size of the error over its standard deviation; infinite without one.
     pub(super) significance: f64,
     /// Whether the samples are read in another way, without a value to fit.
@@ -66,8 +68,8 @@ pub(super) struct Tried {
 
 /// The refused fit, with which every correction is compared.
 pub(super) struct Refused<'a> {
-    question: &'a Question,
-    errors: &'a LoggingErrors,
+    pub(super) question: &'a Question,
+    pub(super) errors: &'a LoggingErrors,
     quality: Quality,
     /// Sum of squared weighted residuals of each joint.
     cost: Vec<f64>,
@@ -165,7 +167,7 @@ impl<'a> Refused<'a> {
             && agrees(self.question, &self.errors.equations, &columns, &torque);
         let quality = Quality { left: self.left(&values, &columns, &torque), sound };
         let mut tried =
-            Tried { cause, quality, significance, is_exact: false, refuses: false, is_shared: false };
+            Tried { cause, quality, values, significance, is_exact: false, refuses: false, is_shared: false };
         tried.cause.explained = self.explained(&tried).into();
         tried
     }
@@ -178,6 +180,7 @@ impl<'a> Refused<'a> {
         Tried {
             cause: changed_midway(midway),
             quality: Quality { left, sound: true },
+            values: Vec::new(),
             significance: f64::INFINITY,
             is_exact: false,
             refuses: true,
@@ -316,6 +319,7 @@ pub(super) fn refit(question: &Question, correction: &Correction) -> Option<Trie
     Some(Tried {
         cause,
         quality,
+        values: Vec::new(),
         significance: f64::INFINITY,
         is_exact: true,
         refuses: false,

@@ -223,7 +223,22 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             (true, Some(_)) => ACCEPTED_WITH_MISFIT,
             (false, _) => REFUSED,
         };
+        if let (ACCEPTED_WITH_MISFIT, Some(errors)) = (run.verdict, &mut errors) {
+            self.explain_misfit(run, &question, errors);
+        }
         Ok(warning)
+    }
+
+    /// Names what explains the misfit of an accepted leg, and adds its effect on the parameters to sigma.
+    fn explain_misfit(&self, run: &mut RunReport, question: &Question, errors: &mut LoggingErrors) {
+        let Some((cause, shift)) = cause::of_misfit(question, errors) else { return };
+        for (sigma, shift) in errors.sigma.iter_mut().zip(shift) {
+            sigma.logging = sigma.logging.hypot(shift);
+        }
+        self.widen(run, errors);
+        if let Some(doubt) = &mut run.doubt {
+            doubt.likely_cause = Some(cause);
+        }
     }
 
     /// Likely cause of a refusal, with its remedy. Takes `suspected`, a current, where it is the cause.

@@ -15,6 +15,7 @@ use crate::view::tables;
 pub(crate) fn banner(run: &RunReport) -> Markup {
     let validated = !run.validation.is_empty();
     let misfit = run.accepted_misfit();
+    let cause = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref());
     html! {
         section.verdict.accepted[run.accepted()].refused[!run.accepted()] {
             @if run.accepted() {
@@ -27,8 +28,14 @@ pub(crate) fn banner(run: &RunReport) -> Markup {
                 }
                 @if let Some(ratio) = misfit {
                     p.warning { strong { "Warning: " } (tables::misfit(ratio)) ". The torque holds something that the model does not, \
-                        within the accepted error. The standard deviations contain its scatter, not a constant part that no \
-                        error of the list below describes." }
+                        within the accepted error. "
+                        @if let Some(cause) = cause {
+                            "Likely cause: " (cause.named()) ". The standard deviations contain its effect on the parameters."
+                        } @else {
+                            "The standard deviations contain its scatter, not a constant part that no error of the list below \
+                            describes."
+                        }
+                    }
                 }
                 @if !validated {
                     p { strong { "Not validated: " } "no motion was held out, so nothing is known of its predictions." }
@@ -37,7 +44,7 @@ pub(crate) fn banner(run: &RunReport) -> Markup {
                 p.word { "Refused" }
                 p { "Do not use this model. It was refused because of:" }
                 ul { @for reason in &run.reasons { li { (sentences(reason, run)) } } }
-                @if let Some(cause) = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref()) {
+                @if let Some(cause) = cause {
                     p { strong { "Likely cause: " } (cause.name.replace('_', " ")) ": " (cause.words) "." }
                 }
             }
