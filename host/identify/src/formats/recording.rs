@@ -174,7 +174,7 @@ impl Recording {
         };
         let (first, second) = (part(0..at), part(at..self.time_s.len()));
         first.check_length("; it is the part before --split: choose a larger share")?;
-        second.check_length("; it is the part that --split holds out: choose a smaller share")?;
+        second.check_length("; it is the part held out for validation (--split): choose a smaller share")?;
         Ok((first, second))
     }
 

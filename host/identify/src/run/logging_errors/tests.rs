@@ -335,7 +335,7 @@ fn assumptions_that_fail_are_found_at_their_size() {
         ("load_friction", Some(1), 10.0, with_torques(|_, motion, torques| load(torques, motion, 0, 0.1))),
         ("torque_clock", None, 2000.0, late(2e-3)),
         (
-            "offset_step",
+            "changed_midway",
             Some(2),
             3.0,
             with_torques(|time_s, _, torques| {
