@@ -380,7 +380,7 @@ mod tests {
             assert!(["", "accept", "refuse", "either"].contains(&row.expect.as_str()), "{}", row.name);
         }
         for row in &rows.fault {
-            let clean = Sample::new(5, row.least_joints, row.parallel).expect("a leg");
+            let clean = Sample::new(1, row.least_joints, row.parallel).expect("a leg");
             let mut sample = clean.clone();
             sample.inject(&row.kind, &row.sizes, 1);
             assert!(clean.files() != sample.files(), "{}", row.kind);
