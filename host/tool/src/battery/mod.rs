@@ -336,9 +336,14 @@ fn faulty(row: &Kind, seed: u64) -> Result<Trial, ToolError> {
 }
 
 impl Case {
-    fn run(&self) -> Judged {
-        let judged =
-            (self.make)().map(|trial| Judged { note: trial.note, ..trial.expect.judge(&trial.task.run()) });
+    fn run(&self, out: Option<&Path>) -> Judged {
+        let judged = (self.make)().and_then(|trial| {
+            let judged = trial.expect.judge(&trial.task.run());
+            if let Some(folder) = out.filter(|_| judged.miss.is_some()) {
+                trial.task.save(&folder.join(&self.name))?;
+            }
+            Ok(Judged { note: trial.note, ..judged })
+        });
         let judged = judged.unwrap_or_else(|error| Judged {
             miss: Some(error.to_string()),
             ..accepted(Values::new())
@@ -356,12 +361,12 @@ pub fn list(selection: &Selection) -> Result<String, ToolError> {
     Ok(cases(selection)?.iter().map(|case| format!("{}\n", case.name)).collect())
 }
 
-/// Runs and judges the selected cases, in parallel.
+/// Runs and judges the selected cases, in parallel. `out` is a folder for the files of cases that miss.
 ///
 /// # Errors
 /// The table cannot be read, or a recording of a source is invalid.
-pub fn run(selection: &Selection) -> Result<Battery, ToolError> {
-    Ok(Battery::new(cases(selection)?.par_iter().map(Case::run).collect()))
+pub fn run(selection: &Selection, out: Option<&Path>) -> Result<Battery, ToolError> {
+    Ok(Battery::new(cases(selection)?.par_iter().map(|case| case.run(out)).collect()))
 }
 
 #[cfg(test)]
@@ -380,7 +385,7 @@ mod tests {
             assert!(["", "accept", "refuse", "either"].contains(&row.expect.as_str()), "{}", row.name);
         }
         for row in &rows.fault {
-            let clean = Sample::new(5, row.least_joints, row.parallel).expect("a leg");
+            let clean = Sample::new(1, row.least_joints, row.parallel).expect("a leg");
             let mut sample = clean.clone();
             sample.inject(&row.kind, &row.sizes, 1);
             assert!(clean.files() != sample.files(), "{}", row.kind);

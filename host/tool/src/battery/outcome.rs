@@ -150,6 +150,15 @@ impl Task {
         Self { training, held_out, ..self.clone() }
     }
 
+    /// Writes leg and recordings for `replay` into a folder.
+    pub(super) fn save(&self, folder: &Path) -> Result<(), ToolError> {
+        files::write(&folder.join("leg.toml"), &self.leg)?;
+        for (number, (_, text)) in self.training.iter().chain(&self.held_out).enumerate() {
+            files::write(&folder.join(format!("{number}.csv")), text)?;
+        }
+        Ok(())
+    }
+
     /// Identifies and judges as `scarab replay` does.
     pub(super) fn run(&self) -> Outcome {
         self.replayed().unwrap_or_else(|error| Outcome {

@@ -5,7 +5,7 @@ use scarab_base::error::{EXIT_ACCEPTED, ToolError};
 use scarab_base::{files, output};
 
 use crate::battery::{Selection, list, run};
-use crate::cli::arguments::Output;
+use crate::cli::arguments::{Output, OutputFolder};
 
 /// Exit code where a case misses.
 const EXIT_MISSES: u8 = 1;
@@ -32,6 +32,9 @@ pub(crate) struct BatteryArguments {
     /// Write every case as JSON here; an existing file is not replaced.
     #[arg(long)]
     json: Option<Output>,
+    /// Write leg and recordings of every case that misses into a folder of its name here.
+    #[arg(long, value_name = "DIR", conflicts_with = "list")]
+    out: Option<OutputFolder>,
 }
 
 /// Judges and reports; returns the exit code.
@@ -44,7 +47,7 @@ pub(crate) fn run_battery(arguments: &BatteryArguments) -> Result<u8, ToolError>
     if let Some(path) = &arguments.json {
         files::check_new(path)?;
     }
-    let battery = run(&selection)?;
+    let battery = run(&selection, arguments.out.as_deref())?;
     if let Some(path) = &arguments.json {
         let text =
             serde_json::to_string_pretty(&battery).map_err(|error| ToolError::cannot_write(path, &error))?;
