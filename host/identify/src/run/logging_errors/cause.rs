@@ -95,8 +95,8 @@ pub(crate) fn likely(
     }
 }
 
-/// Explains the misfit of an accepted leg: the error that is named alone, and the shift of each parameter when
-/// it is fitted.
+/// Explains the misfit of an accepted leg: the error that is named alone, and the shift of each parameter
+/// when it is fitted.
 pub(crate) fn of_misfit(question: &Question, errors: &LoggingErrors) -> Option<(CauseReport, Vec<f64>)> {
     let refused = Refused::new(question, errors);
     let best = named(&refused, &mut fitted(&refused))?;
