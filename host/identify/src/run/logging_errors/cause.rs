@@ -55,9 +55,7 @@ pub(crate) fn likely(
     if let Some(finding) = samples.iter().find(|finding| finding.refuses) {
         return sample_cause(finding);
     }
-    let found =
-        without_torque(findings).or_else(|| without_weight(findings)).or_else(|| motionless(findings));
-    if let Some(cause) = found {
+    if let Some(cause) = without_torque(findings).or_else(|| motionless(findings)) {
         return cause;
     }
     let Some(errors) = errors else { return excluded(samples).unwrap_or_else(unknown) };
@@ -89,9 +87,10 @@ pub(crate) fn likely(
     tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
     match named(&refused, &mut tried) {
         Some(best) => best.cause,
-        None => {
-            unsigned(question, errors).or_else(|| excluded(samples)).unwrap_or_else(|| refused.unknown(tried))
-        }
+        None => without_weight(findings)
+            .or_else(|| unsigned(question, errors))
+            .or_else(|| excluded(samples))
+            .unwrap_or_else(|| refused.unknown(tried)),
     }
 }
 
