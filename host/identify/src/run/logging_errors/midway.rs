@@ -32,6 +32,8 @@ pub(super) const POINTS: usize = 39;
 pub(crate) struct Midway {
     /// Joint, from 0; `None` for all.
     pub(crate) joint: Option<usize>,
+    /// Recording in which the torque changes; `None` for all.
+    scope: Option<usize>,
     /// Share of the recording after which the change acts.
     pub(crate) share: f64,
     /// Relative change of the gain; -2 is a change of sign.
@@ -46,6 +48,18 @@ impl Midway {
     /// Whether the change refuses the recording.
     pub(crate) fn refuses(&self) -> bool {
         self.change.abs() > self.limit()
+    }
+
+    /// Whether a row comes after the change.
+    fn acts_on(&self, source: &RowSource) -> bool {
+        is_after(source, self.scope, self.joint, self.share)
+    }
+
+    /// Torques without the change.
+    pub(crate) fn corrected(&self, all: &Equations) -> Vec<f64> {
+        let rows = all.sources.iter().zip(&all.torque);
+        rows.map(|(source, torque)| if self.acts_on(source) { torque / (1.0 + self.change) } else { *torque })
+            .collect()
     }
 
     /// Limit of the change.
@@ -114,7 +128,7 @@ fn strongest(all: &Equations) -> Option<Midway> {
     let whole = Sums::new(all, |_| true);
     let motions = all.sources.iter().map(|source| source.motion).max()? + 1;
     let scopes = std::iter::once(None).chain((0..motions).filter(|_| motions > 1).map(Some));
-    let mut best: Option<(Midway, Option<usize>, f64)> = None;
+    let mut best: Option<Midway> = None;
     for scope in scopes {
         for joint in (0..all.joints()).map(Some).chain((all.joints() > 1).then_some(None)) {
             let own = Sums::new(all, |source| is_after(source, scope, joint, -1.0));
@@ -127,21 +141,24 @@ fn strongest(all: &Equations) -> Option<Midway> {
                     continue;
                 }
                 let (factor, explained) = change(&plain, &whole, &after);
-                if explained > always + EXPLAINED_SHARE
-                    && best.is_none_or(|(best, _, _)| explained > best.explained)
+                if explained > always + EXPLAINED_SHARE && best.is_none_or(|best| explained > best.explained)
                 {
-                    let found = Midway { joint, share, change: 1.0 / factor - 1.0, sigma: 0.0, explained };
-                    best = Some((found, scope, factor));
+                    best = Some(Midway {
+                        joint,
+                        scope,
+                        share,
+                        change: 1.0 / factor - 1.0,
+                        sigma: 0.0,
+                        explained,
+                    });
                 }
             }
         }
     }
-    let (mut found, scope, factor) = best?;
+    let mut found = best?;
     // Uncertainty of the factor: the torque after the change as a further column.
-    let is_changed = |source: &RowSource| is_after(source, scope, found.joint, found.share);
-    let changed =
-        |(source, torque): (&RowSource, &f64)| if is_changed(source) { factor * torque } else { *torque };
-    let torque: Vec<f64> = all.sources.iter().zip(&all.torque).map(changed).collect();
+    let is_changed = |source: &RowSource| found.acts_on(source);
+    let torque = found.corrected(all);
     let fit = all.fit(&all.columns, &torque, false);
     let predicted = fit.predictions(&all.columns);
     let column = |(source, torque): (&RowSource, &f64)| if is_changed(source) { *torque } else { 0.0 };

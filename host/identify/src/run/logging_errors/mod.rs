@@ -180,8 +180,6 @@ pub(crate) struct LoggingErrors {
     pub(crate) midway: Option<Midway>,
     /// Misfit over noise of each joint; `None` where the noise is unknown.
     pub(crate) misfit_over_noise: Vec<Option<f64>>,
-    /// Part of the weighted misfit's power that is not noise, 0..1; one where the noise is unknown.
-    pub(crate) systematic: f64,
     /// Standard deviation of each base parameter: noise, scatter over segments, and possible errors that were
     /// not refused.
     pub(crate) sigma: Vec<Sigma>,
@@ -284,7 +282,6 @@ impl LoggingErrors {
             directions,
             midway,
             misfit_over_noise,
-            systematic,
             sigma,
             encoder,
             better_hz,

@@ -172,20 +172,16 @@ impl<'a> Refused<'a> {
         tried
     }
 
-    /// A gain that changes midway. Its sentence names its share of the weighted misfit of all joints.
+    /// A gain that changes midway.
     pub(super) fn midway(&self, midway: &Midway) -> Tried {
-        let share = (midway.explained / self.errors.systematic.max(1e-3)).min(1.0);
-        let each = self.quality.left.iter().zip(&self.noise);
-        let left = each.map(|(left, noise)| left - share * (left - noise)).collect();
-        Tried {
-            cause: changed_midway(midway),
-            quality: Quality { left, sound: true },
-            values: Vec::new(),
-            significance: f64::INFINITY,
-            is_exact: false,
-            refuses: true,
-            is_shared: false,
-        }
+        let all = &self.errors.equations;
+        let torque = midway.corrected(all);
+        let values = all.fit(&all.columns, &torque, false).values;
+        let significance = midway.change.abs() / midway.sigma;
+        let cause = changed_midway(midway);
+        let columns = all.columns.clone();
+        let tried = self.tried(Refitted { cause, values, columns, torque, significance });
+        Tried { refuses: true, ..tried }
     }
 
     /// Directions that are more than chance, then each kind that several joints show at once.
