@@ -109,7 +109,8 @@ pub struct CauseReport {
     pub(crate) explained: Number,
     /// Sentence with the evidence.
     pub words: String,
-    /// Where the cause is unknown: corrections that explain part of the misfit.
+    /// Corrections that explain part of the misfit of an unknown cause, or are not distinguished from a named
+    /// one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) possible: Vec<CauseReport>,
     /// Units in which the cause reads the columns.

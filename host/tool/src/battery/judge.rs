@@ -174,7 +174,6 @@ impl Accept {
                     let to_si = |unit: &str| match unit {
                         "ms" => 1e-3,
                         "%" => 0.01,
-                        "rad" => 1.0_f64.to_degrees(),
                         _ => 1.0,
                     };
                     own.any(|found| {

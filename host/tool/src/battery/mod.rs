@@ -268,6 +268,9 @@ fn damaged(
         let before = format!("{:?}", leg.gravity);
         damage::turn_gravity(&mut leg.gravity, size);
         task.leg = task.leg.replace(&before, &format!("{:?}", leg.gravity));
+        if task.leg == clean.task.leg {
+            return Err(ToolError::input(format!("the leg file does not state its gravity as {before}")));
+        }
     } else {
         let mut recordings = clean.recordings.clone();
         if !damage::apply(&row.kind, &mut recordings, size, &damaged) {
@@ -366,7 +369,11 @@ pub fn list(selection: &Selection) -> Result<String, ToolError> {
 /// # Errors
 /// The table cannot be read, or a recording of a source is invalid.
 pub fn run(selection: &Selection, out: Option<&Path>) -> Result<Battery, ToolError> {
-    Ok(Battery::new(cases(selection)?.par_iter().map(|case| case.run(out)).collect()))
+    let cases = cases(selection)?;
+    if cases.is_empty() {
+        return Err(ToolError::input("no case has such a name, or its files are missing: see --list"));
+    }
+    Ok(Battery::new(cases.par_iter().map(|case| case.run(out)).collect()))
 }
 
 #[cfg(test)]

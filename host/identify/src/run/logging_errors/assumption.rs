@@ -12,8 +12,9 @@
 //! changed_midway j  torque_j = Y_j p + c after a time      the best of a grid; a gain: midway.rs
 //! ```
 //!
-//! Each is fitted with the parameters eliminated. They run only after a refusal: a clock or a missing weight
-//! makes another leg, which fits, so most of it shows only beside the other tests. Cost: some fifty fits.
+//! Each is fitted with the parameters eliminated. They run after a refusal and for an accepted misfit: a
+//! clock or a missing weight makes another leg, which fits, so most of it shows only beside the other tests.
+//! Cost: some fifty fits.
 
 use nalgebra::Vector3;
 use scarab::real::dot;
@@ -25,7 +26,7 @@ use crate::run::logging_errors::midway::{POINTS, is_after};
 use crate::run::logging_errors::regressor::Instant;
 use crate::run::logging_errors::rows::{Equations, RowSource};
 use crate::run::logging_errors::table::Table;
-use crate::run::logging_errors::{NO_GRAVITY, Question, Refitted, no_gravity_words};
+use crate::run::logging_errors::{NO_GRAVITY, Question, Refitted, no_gravity_words, recording_words};
 
 /// Rates of a clock that are tried first.
 const RATES: [f64; 12] = [0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 2.5, 3.3, 5.0];
@@ -75,7 +76,7 @@ pub(crate) fn all(question: &Question, equations: &Equations) -> Vec<Refitted> {
             .map(move |other| crosstalk(question, equations, one, other))
     }));
     found.push(load_friction(equations));
-    found.push(torque_clock(equations));
+    found.extend(torque_clock(equations));
     found.extend((0..joints).filter_map(|joint| offset_step(question, equations, joint)));
     found
 }
@@ -261,8 +262,9 @@ fn load_friction(equations: &Equations) -> Refitted {
     Refitted { cause, significance: if is_friction { refitted.significance } else { 0.0 }, ..refitted }
 }
 
-/// Torques whose clock runs at another rate than that of the angles.
-fn torque_clock(equations: &Equations) -> Refitted {
+/// Torques whose clock runs at another rate than that of the angles; `None` where the search leaves its
+/// range.
+fn torque_clock(equations: &Equations) -> Option<Refitted> {
     let largest_s = equations.largest_delay_s();
     let mut late = [0.0; 2];
     let late_s = |late: [f64; 2], source: &RowSource| {
@@ -282,17 +284,26 @@ fn torque_clock(equations: &Equations) -> Refitted {
             late = [late[0] + found[0].0, late[1] + found[1].0];
             continue;
         }
+        let latest_s = equations
+            .sources
+            .iter()
+            .map(|source| (late[0] + late[1] * equations.time_from_middle_s(source)).abs());
+        if latest_s.fold(0.0, f64::max) >= largest_s {
+            return None;
+        }
         let [rate, sigma] = [late[1], found[1].1].map(|rate| 1e6 * rate);
         let cause = CauseReport {
             name: "torque_clock",
             value: rate.into(),
             sigma: sigma.into(),
             words: format!(
-                "torque falls behind the angle by {rate:.0} +- {sigma:.0} ppm of the time: two clocks? Stamp both by one"
+                "torque {} the angle by {:.0} +- {sigma:.0} ppm of the time: two clocks? Stamp both by one",
+                if rate < 0.0 { "runs ahead of" } else { "falls behind" },
+                rate.abs()
             ),
             ..CauseReport::default()
         };
-        return Refitted { cause, significance: significance((rate, sigma)), ..refitted };
+        return Some(Refitted { cause, significance: significance((rate, sigma)), ..refitted });
     }
 }
 
@@ -321,9 +332,10 @@ fn offset_step(question: &Question, equations: &Equations, joint: usize) -> Opti
         value: value.into(),
         sigma: sigma.into(),
         words: format!(
-            "offset of joint {} changes by {value:+.2} +- {sigma:.2} N m after {:.0} % of the recording",
+            "offset of joint {} changes by {value:+.2} +- {sigma:.2} N m after {:.0} % of {}",
             joint + 1,
-            100.0 * best.1
+            100.0 * best.1,
+            recording_words(best.0)
         ),
         ..CauseReport::default()
     };

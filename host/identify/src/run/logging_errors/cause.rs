@@ -9,9 +9,9 @@
 //!
 //! Ranking: findings about samples first, then the plausible correction that leaves least of the misfit. It
 //! is named alone only if it explains half of the misfit beyond the noise. Otherwise the cause is unknown,
-//! and the corrections that explain a tenth or more are listed as possible ones. Where the uncorrected fit is
-//! not plausible, m0 is the misfit of the leg whose parameters have their sign. Causes of equal misfit that
-//! are certain too are listed as not distinguished.
+//! and the corrections that explain a tenth of a joint's misfit, or refuse by themselves, are listed. Where
+//! the uncorrected fit is not plausible, m0 is the misfit of the leg whose parameters have their sign. Causes
+//! of equal misfit that are certain too are listed as not distinguished.
 
 use scarab::ident::Test;
 use scarab_base::stats::rms;
@@ -34,6 +34,8 @@ const MIRRORED: f64 = 1.001;
 
 /// Scale between joints, percent, from which a torque is not in mN m.
 const OTHER_SCALE_PERCENT: f64 = 40.0;
+/// Part of the band near zero by which a magnitude swings below zero when it is resampled.
+const SWING: f64 = 0.25;
 /// Mean change over the time near zero, over the width of that band, from which a torque is slow there.
 const SLOW: f64 = 2.5;
 /// Speed from which a joint moves, rad/s.
@@ -139,8 +141,10 @@ fn named(refused: &Refused<'_>, tried: &mut Vec<Tried>) -> Option<Tried> {
             100.0 * refused.explained(&best)
         );
     }
+    best.cause.explained = refused.explained(&best).into();
     if !alike.is_empty() {
-        let subjects: Vec<String> = alike.iter().map(subject).collect();
+        let mut subjects: Vec<String> = alike.iter().map(subject).collect();
+        subjects.dedup();
         best.cause.words += &format!("; not distinguished from {}", subjects.join(", "));
         best.cause.possible = alike;
     }
@@ -163,13 +167,12 @@ fn unsigned(question: &Question, errors: &LoggingErrors) -> Option<CauseReport> 
         let torques: Vec<f64> =
             question.motions.iter().flat_map(|motion| motion.torque.column(joint)).collect();
         let [low, high] = [f64::min, f64::max].map(|of| torques.iter().copied().fold(0.0, of));
-        // Resampling swings over at a corner.
         let zero = NEAR_ZERO * (high - low);
         let near: Vec<bool> = torques.iter().map(|torque| torque.abs() < zero).collect();
         let returns = near.windows(2).filter(|pair| !pair[0] && pair[1]).count();
         let samples = near.iter().filter(|near| **near).count() as f64;
         let change = rms(torques.windows(2).map(|pair| pair[1] - pair[0]));
-        (low > -zero || high < zero)
+        (low > -SWING * zero || high < SWING * zero)
             && returns >= LEAST_RETURNS
             && samples * change < SLOW * 2.0 * zero * returns as f64
     })?;

@@ -8,8 +8,10 @@
 //! Why: both look alike where the motion is slow against 1 / T, but they need different corrections. Each is
 //! fitted with the parameters eliminated. The columns are filtered; inverting the filter on the torque would
 //! amplify its noise, and the best time would come out too short. The time comes from a scan and a search
-//! between its best points. Runs only after a refusal. Cost: about 25 fits of the rows for each joint and for
-//! all.
+//! between its best points. Runs after a refusal and for an accepted misfit. Cost: about 25 fits of the rows
+//! for each joint and for all.
+
+use scarab_base::number::Number;
 
 use crate::report::doubt::CauseReport;
 use crate::run::logging_errors::fit::Fit;
@@ -28,6 +30,8 @@ const DIFFERENCE: f64 = 1e-2;
 /// Factor by which a low-pass must leave less of the misfit than a delay. On a real arm, whose misfit is many
 /// times its noise, a low-pass leaves 1.25 times less although the torque is delayed by 60 ms.
 const CLEARER: f64 = 1.3;
+/// Share of the longest time from which a search ended there.
+const AT_END: f64 = 0.98;
 /// Golden section.
 const SECTION: f64 = 0.618_033_988_749_895;
 
@@ -108,7 +112,11 @@ impl Search<'_> {
         let own_cost = joint.map_or_else(|| cost.iter().sum(), |joint| cost[joint]);
         let sigma_s = (remaining.sqrt() * scored.noise_sigma).max(scored.segment_sigma);
         let refitted = Refitted {
-            cause: cause(kind, joint, time_s, sigma_s),
+            cause: if time_s > AT_END * largest_s {
+                at_end(kind, joint, time_s)
+            } else {
+                cause(kind, joint, time_s, sigma_s)
+            },
             values: fit.values,
             columns,
             torque,
@@ -134,6 +142,17 @@ pub(super) fn least(mut low: f64, mut high: f64, cost: impl Fn(f64) -> f64) -> f
         }
     }
     0.5 * (low + high)
+}
+
+/// A lag longer than the search: no estimate.
+fn at_end(kind: Kind, joint: Option<usize>, time_s: f64) -> CauseReport {
+    let words = format!(
+        "torque of {} lags by {:.0} ms or more; not determined, the search ended there",
+        joint_words(joint),
+        1e3 * time_s
+    );
+    let none = Number::UNKNOWN;
+    CauseReport { value: none, sigma: none, words, ..cause(kind, joint, time_s, 0.0) }
 }
 
 fn cause(kind: Kind, joint: Option<usize>, time_s: f64, sigma_s: f64) -> CauseReport {

@@ -33,7 +33,7 @@ pub(crate) struct Midway {
     /// Joint, from 0; `None` for all.
     pub(crate) joint: Option<usize>,
     /// Recording in which the torque changes; `None` for all.
-    scope: Option<usize>,
+    pub(crate) scope: Option<usize>,
     /// Share of the recording after which the change acts.
     pub(crate) share: f64,
     /// Relative change of the gain; -2 is a change of sign.

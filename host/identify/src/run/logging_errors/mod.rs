@@ -349,14 +349,19 @@ impl LoggingErrors {
     }
 }
 
+/// Acceleration of gravity across a joint's axis from which a leg's weight must show, m/s^2.
+const LEAST_GRAVITY: f64 = 1.0;
+
 /// Standard deviations by which the weight shows: the misfit without gravity over that with it. The torque of
-/// one joint may be balanced.
+/// one joint may be balanced, and one about vertical axes holds no weight.
 fn weight(equations: &Equations) -> Option<f64> {
     let weightless = equations.regressor.with_gravity(&|_| Vector3::zeros());
     let columns = equations.columns_of(&*weightless, &|_| {});
     let [plain, without] =
         [&equations.columns, &columns].map(|columns| equations.fit(columns, &equations.torque, false).cost);
-    let has_weight = equations.joints() > 1 && columns != equations.columns;
+    let pairs = equations.columns.elements().zip(columns.elements());
+    let largest = pairs.map(|(with, without)| (with - without).abs()).fold(0.0, f64::max);
+    let has_weight = equations.joints() > 1 && largest > LEAST_GRAVITY;
     has_weight.then(|| (without - plain).max(0.0).sqrt())
 }
 
@@ -398,10 +403,16 @@ pub(crate) fn midway_words(midway: &Midway) -> String {
         format!("changes by {:+.0} +- {:.0} %", 100.0 * midway.change, 100.0 * midway.sigma)
     };
     format!(
-        "the torque of {joints} {what} after {:.0} % of the recording, which explains {:.0} % of the misfit",
+        "the torque of {joints} {what} after {:.0} % of {}, which explains {:.0} % of the misfit",
         100.0 * midway.share,
+        recording_words(midway.scope),
         100.0 * midway.explained
     )
+}
+
+/// One recording, or each, in words.
+fn recording_words(scope: Option<usize>) -> String {
+    scope.map_or("each recording".into(), |motion| format!("recording {}", motion + 1))
 }
 
 /// One joint, or all, in words.

@@ -260,15 +260,15 @@ impl<'a> Refused<'a> {
             let words = |tried: &Tried| {
                 let (joint, share) = self.explained_of_joint(tried);
                 format!(
-                    "{} (explains {:.0} %, {:.0} % of joint {})",
+                    "{} (explains {:.0} %, of joint {} {:.0} %)",
                     tried.cause.named(),
                     100.0 * self.explained(tried),
-                    100.0 * share,
-                    joint + 1
+                    joint + 1,
+                    100.0 * share
                 )
             };
             format!(
-                "no correction explains half of the misfit beyond the noise. Possible causes among others: {}",
+                "no correction explains enough of the misfit beyond the noise. Possible causes among others: {}",
                 possible.iter().map(words).collect::<Vec<_>>().join("; or ")
             )
         };
