@@ -34,8 +34,6 @@ const MIRRORED: f64 = 1.001;
 
 /// Scale between joints, percent, from which a torque is not in mN m.
 const OTHER_SCALE_PERCENT: f64 = 40.0;
-/// Part of the band near zero by which a magnitude swings below zero when it is resampled.
-const SWING: f64 = 0.25;
 /// Mean change over the time near zero, over the width of that band, from which a torque is slow there.
 const SLOW: f64 = 2.5;
 /// Speed from which a joint moves, rad/s.
@@ -43,6 +41,8 @@ const MOVING_RADPS: f64 = 0.03;
 /// Share of its largest value at which a torque counts as zero, and how often one without sign returns there.
 const NEAR_ZERO: f64 = 0.02;
 const LEAST_RETURNS: usize = 3;
+/// Samples at 500 Hz for each such return: a torque of one sign may touch zero now and then.
+const SAMPLES_PER_RETURN: usize = 1000;
 fn unknown() -> CauseReport {
     CauseReport { name: UNKNOWN, words: "too few rows to try corrections".into(), ..CauseReport::default() }
 }
@@ -168,12 +168,13 @@ fn unsigned(question: &Question, errors: &LoggingErrors) -> Option<CauseReport> 
             question.motions.iter().flat_map(|motion| motion.torque.column(joint)).collect();
         let [low, high] = [f64::min, f64::max].map(|of| torques.iter().copied().fold(0.0, of));
         let zero = NEAR_ZERO * (high - low);
+        // Resampling swings over at a corner.
         let near: Vec<bool> = torques.iter().map(|torque| torque.abs() < zero).collect();
         let returns = near.windows(2).filter(|pair| !pair[0] && pair[1]).count();
         let samples = near.iter().filter(|near| **near).count() as f64;
         let change = rms(torques.windows(2).map(|pair| pair[1] - pair[0]));
-        (low > -SWING * zero || high < SWING * zero)
-            && returns >= LEAST_RETURNS
+        (low > -zero || high < zero)
+            && returns >= LEAST_RETURNS.max(torques.len() / SAMPLES_PER_RETURN)
             && samples * change < SLOW * 2.0 * zero * returns as f64
     })?;
     Some(CauseReport {
