@@ -55,6 +55,7 @@ pub use leg::from_robot::{FromRobot, RobotOptions, leg as leg_of_robot};
 pub use leg::placed_mass::PlacedMass;
 pub use leg::setup::PriorChoice;
 pub use leg::states::Angles;
+pub use report::additional_torque::{AdditionalKind, AdditionalTorque};
 pub use report::doubt::{CauseReport, DoubtReport};
 pub use report::findings::FindingReport;
 pub use report::series::Series;

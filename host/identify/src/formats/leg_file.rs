@@ -28,6 +28,7 @@
 //! | `offset`, `rotor` | `"auto"`, `"on"`, `"off"`: estimate torque offset, rotor inertia | on, on |
 //! | `stribeck_model` | `"auto"`, `"on"`, `"off"`: estimate Stribeck friction | auto |
 //! | `asymmetric_coulomb` | `"auto"`, `"on"`, `"off"`: one Coulomb level per direction | off |
+//! | `spring`, `load_friction` | the same: spring beside the drive, friction by load; `replay` only | auto |
 //! | `stribeck` | `{ static_nm, speed_rad_s }`: simulated static friction, speed of its decay | none |
 //! | `truth`, `prior` | see below | none |
 //! | `brake` | `{ release_ms, engage_ms }`: times of a holding brake on the board's output | none |
@@ -204,6 +205,12 @@ pub struct JointFile {
     /// Whether Coulomb friction has a level for each direction.
     #[serde(default = "never", skip_serializing_if = "Switch::is_off")]
     pub asymmetric_coulomb: Switch,
+    /// Whether a spring beside the drive is estimated from recordings.
+    #[serde(default = "automatic", skip_serializing_if = "Switch::is_auto")]
+    pub spring: Switch,
+    /// Whether friction that grows with the load is estimated from recordings.
+    #[serde(default = "automatic", skip_serializing_if = "Switch::is_auto")]
+    pub load_friction: Switch,
     /// Static friction above Coulomb friction, simulated only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stribeck: Option<StribeckFile>,

@@ -27,6 +27,7 @@ use scarab_base::toml_file::{self, Fault, Step};
 use serde::{Deserialize, Serialize};
 
 use crate::formats::leg_file::{BodySide, DhFile, JointFile, LegFile};
+use crate::report::additional_torque::{AdditionalKind, AdditionalTorque, rest_name};
 use crate::report::{ACCEPTED, ACCEPTED_WITH_MISFIT};
 
 /// Version of the keys.
@@ -163,6 +164,9 @@ pub struct BaseSet {
     /// Stribeck friction of the joints that show it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stribeck: Vec<StoredStribeck>,
+    /// Springs and friction by load.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub additional_torque: Vec<AdditionalTorque>,
 }
 
 /// Stribeck friction of one joint: surplus * exp(-(speed / its speed)^2) on top of Coulomb friction.
@@ -282,6 +286,13 @@ impl ModelFile {
     /// while its joint moves.
     pub(crate) fn is_asymmetry(name: &str) -> bool {
         name.starts_with(ASYMMETRY)
+    }
+
+    /// Whether the name is that of a spring's torque at angle zero.
+    pub(crate) fn is_rest(&self, name: &str) -> bool {
+        let springs =
+            self.base_set.additional_torque.iter().filter(|torque| torque.kind == AdditionalKind::Spring);
+        springs.into_iter().any(|torque| torque.joint > 0 && rest_name(torque.joint - 1) == name)
     }
 
     /// Fourteen parameters of a joint; `None` if one is unknown.

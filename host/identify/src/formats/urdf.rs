@@ -62,6 +62,8 @@ struct Link<'a> {
     body: RigidBody<f64>,
     /// Whether the constant column is a difference of friction between the directions.
     is_asymmetric: bool,
+    /// Springs and friction by load, which a robot description cannot state.
+    additional: String,
     /// Names of parameters by their status.
     standing: String,
 }
@@ -106,7 +108,11 @@ impl<'a> Link<'a> {
             ModelFile::is_asymmetry(&parameter.name)
                 && model.parameter(&parameter.name).is_some_and(|(own, _)| own == number)
         });
-        Ok(Self { joint, parameters, body, is_asymmetric, standing })
+        let torques = model.base_set.additional_torque.iter().filter(|torque| torque.joint == number + 1);
+        let words = torques
+            .map(|torque| format!(", and for {}: {}", torque.kind.name().replace('_', " "), torque.words()));
+        let additional = words.collect();
+        Ok(Self { joint, parameters, body, is_asymmetric, additional, standing })
     }
 
     /// Describes the constant column.
@@ -132,6 +138,10 @@ impl<'a> Link<'a> {
 fn full_set_gives_the_base_set(model: &ModelFile) -> Result<(), String> {
     for base in &model.base_set.parameters {
         let known = |name: &str| {
+            // The offset of the full set contains it.
+            if model.is_rest(name) {
+                return Some(0.0);
+            }
             let (joint, parameter) = model.parameter(name)?;
             Some(model.joint_parameters(joint)?[parameter.index()])
         };
@@ -202,9 +212,10 @@ fn joint(xml: &mut Xml, link: &Link<'_>, parent: &str, child: &str) -> io::Resul
         xml,
         &format!(
             "no place in this format for the rotor inertia at the joint, {} kg m2 (MuJoCo, Pinocchio: armature), and for \
-             {}",
+             {}{}",
             link.parameter(Parameter::IA),
-            link.constant()
+            link.constant(),
+            link.additional
         ),
     )?;
     inside(xml, "joint", &[("name", stored.name.as_str().into()), ("type", "revolute".into())], |xml| {

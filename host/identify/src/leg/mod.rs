@@ -1,5 +1,6 @@
 //! A leg file becomes the firmware's configuration, its prior and its plant.
 
+pub(crate) mod additional_torque;
 pub(crate) mod axes;
 pub mod background;
 pub mod board_words;

@@ -18,11 +18,38 @@ pub struct DoubtReport {
     pub(crate) accept_error_percent: f64,
     /// Parameters that end at a limit of the prior.
     pub(crate) at_prior_limit: Vec<String>,
+    /// Springs that could replace weight unseen.
+    pub(crate) unseen_springs: Vec<UnseenSpring>,
     /// Scatter between the recordings identified from.
     pub(crate) recordings: RecordingsReport,
     /// Bandwidth of the rows.
     #[serde(flatten)]
     pub(crate) bandwidth: Option<BandwidthReport>,
+}
+
+/// Spring beside a drive that the motion does not distinguish from weight.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct UnseenSpring {
+    /// Joint, from 1.
+    pub(crate) joint: usize,
+    /// Two standard deviations of its stiffness, N m/rad.
+    pub(crate) stiffness: f64,
+    /// Base parameter that it would change.
+    pub(crate) parameter: String,
+    /// Share of the parameter by which it would.
+    pub(crate) change: f64,
+}
+
+impl UnseenSpring {
+    /// Sentence for the verdict.
+    pub(crate) fn words(&self) -> String {
+        let Self { joint, stiffness, parameter, change } = self;
+        format!(
+            "spring at joint {joint}: this motion does not show one below {stiffness:.2} N m/rad, which would change {parameter} by \
+             {:.0} %; move the joint further, or, if there can be one, state `spring = \"on\"` in the leg file",
+            100.0 * change
+        )
+    }
 }
 
 /// Bandwidth of a replay.

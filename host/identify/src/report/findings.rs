@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 use scarab_base::number::Number;
 use scarab_base::words::{Word, word};
 
+use crate::report::RunReport;
+use crate::report::doubt::UnseenSpring;
+
 /// Largest error of a length, as share, and of a zero, rad, that a step from the model still estimates.
 const LINEAR_LENGTH: f64 = 0.3;
 const LINEAR_ZERO_RAD: f64 = 0.35;
@@ -76,8 +79,8 @@ impl FindingReport {
 /// Error of a link's length that every recording should show.
 const LARGEST_UNTESTED_LENGTH: f64 = 0.1;
 
-/// Sentences about lengths that the recording hardly tests: the limit of their test is wide.
-pub fn untested_lengths(findings: &[FindingReport]) -> Vec<String> {
+/// Sentences about what a recording hardly tests: lengths whose test has a wide limit, and springs.
+pub fn hardly_tested(run: &RunReport) -> Vec<String> {
     let wide = |finding: &&FindingReport| {
         finding.test == Test::LinkLength.name()
             && finding.passed
@@ -94,7 +97,8 @@ pub fn untested_lengths(findings: &[FindingReport]) -> Vec<String> {
             finding.joint.unwrap_or(0)
         )
     };
-    findings.iter().filter(wide).map(words).collect()
+    let springs = run.doubt.iter().filter(|_| run.accepted()).flat_map(|doubt| &doubt.unseen_springs);
+    run.findings.iter().filter(wide).map(words).chain(springs.map(UnseenSpring::words)).collect()
 }
 
 /// Sentence for a failed test.

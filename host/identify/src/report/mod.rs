@@ -2,6 +2,7 @@
 //!
 //! The names of the fields are an interface. An unknown number is `null`, never NaN.
 
+pub mod additional_torque;
 pub mod disturbances;
 pub mod doubt;
 pub mod excite;
@@ -20,6 +21,7 @@ use scarab_base::words::{Word, optional_word, word, words};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use serde_json::Value;
 
+use crate::report::additional_torque::AdditionalTorque;
 use crate::report::disturbances::{OutliersReport, StribeckReport};
 use crate::report::doubt::{DoubtReport, SampleFinding};
 use crate::report::findings::FindingReport;
@@ -319,6 +321,9 @@ pub struct RunReport {
     pub base_parameters: Vec<BaseReport>,
     /// Stribeck friction of the joints that show it.
     pub stribeck: Vec<StribeckReport>,
+    /// Springs and friction by load, which were subtracted from the recorded torques.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub additional_torque: Vec<AdditionalTorque>,
     /// Requested and used model of each joint, and why.
     pub model_choice: Vec<ModelChoiceReport>,
     /// Joints whose Coulomb friction differs between the directions.

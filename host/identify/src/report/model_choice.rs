@@ -2,16 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::report::additional_torque::AdditionalKind;
 use scarab_base::number::Number;
 use scarab_base::precision::{sigma, value};
 use scarab_base::words::{Word, word};
 
 /// Decision about one term of one joint's model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ModelChoiceReport {
     /// Joint, from 1.
     pub joint: usize,
-    /// `rotor`, `offset`, `stribeck` or `asymmetric_coulomb`, as in leg files.
+    /// `rotor`, `offset`, `stribeck`, `asymmetric_coulomb`, `spring` or `load_friction`, as in leg files.
     #[serde(deserialize_with = "word")]
     pub option: Word,
     /// `auto`, `on` or `off`.
@@ -26,6 +27,13 @@ pub struct ModelChoiceReport {
     pub limit_chi2: Number,
     /// Reason in words.
     pub why: String,
+}
+
+impl ModelChoiceReport {
+    /// Whether it is a spring or friction by load that the leg file demands.
+    pub(crate) fn is_demanded_addition(&self) -> bool {
+        self.asked == "on" && AdditionalKind::ALL.map(AdditionalKind::name).contains(&self.option)
+    }
 }
 
 /// Coulomb friction of one joint in both directions.

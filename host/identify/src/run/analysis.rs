@@ -263,6 +263,7 @@ impl<const N: usize, const B: usize> Background<N, B> {
             condition: outcome.condition,
             parameters: outcome.parameters,
             base_parameters: base.into_iter().chain(surpluses).collect(),
+            additional_torque: Vec::new(),
             model_choice: self.model_choice(&outcome.selection, &sizes),
             asymmetric_coulomb: self.directions(dropped, estimate),
             temperature_c: self.temperature_c.into(),

@@ -14,7 +14,8 @@
 //! | in | states of motion ([`crate::leg::states`]); `t_s` if present |
 //! | out | `t_s` if present, else `k` from 0; per joint the columns below |
 //! | torque and its sigma | `tau1_Nm`, `tau1_sigma_Nm` |
-//! | parts of the torque | `tau1_rigid_Nm` (bodies, gravity, rotor), `tau1_friction_Nm`, `tau1_offset_Nm` |
+//! | bodies, gravity, rotor, spring | `tau1_rigid_Nm` |
+//! | friction; offset | `tau1_friction_Nm`, `tau1_offset_Nm` |
 //!
 //! A difference of Coulomb friction between the directions (`FCA1`) counts as friction, an offset
 //! does not. Torques have the sign of the given angles. At a speed of exactly 0 Coulomb friction is
@@ -23,20 +24,21 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use scarab::model::{Chain, JointState, Parameter, regressor};
+use scarab::model::{AnatomicalJoint, Chain, JointState, Parameter, regressor};
 use scarab::real::sign;
 use scarab_base::error::ToolError;
 
-use crate::formats::leg_file::geometry::chain;
+use crate::formats::leg_file::geometry::{anatomy, chain};
 use crate::formats::model_file::ModelFile;
+use crate::leg::additional_torque;
 use crate::leg::states::{Angles, States};
 
 /// Torque of one joint, N m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Prediction {
-    /// Torque of bodies, gravity and rotor.
+    /// Torque of bodies, gravity, rotor and spring.
     pub rigid: f64,
-    /// Coulomb, viscous and Stribeck friction.
+    /// Coulomb, viscous and Stribeck friction, and friction by load.
     pub friction: f64,
     /// Constant torque.
     pub offset: f64,
@@ -57,6 +59,7 @@ pub struct Predictor<'a, const N: usize> {
     model: &'a ModelFile,
     chain: Chain<f64, N>,
     gravity: Vector3<f64>,
+    anatomy: [AnatomicalJoint<f64>; N],
     /// Joint and parameter of each base parameter's carrier, and whether it acts only while its joint moves.
     carriers: Vec<(usize, Parameter, bool)>,
 }
@@ -70,7 +73,7 @@ impl<'a, const N: usize> Predictor<'a, N> {
             Some((joint, parameter, ModelFile::is_asymmetry(&base.carrier)))
         });
         let (chain, gravity) = (chain(&leg)?, Vector3::from(leg.gravity));
-        Ok(Self { model, chain, gravity, carriers: carriers.collect() })
+        Ok(Self { model, chain, gravity, anatomy: anatomy(&leg)?, carriers: carriers.collect() })
     }
 
     /// Torques of a state in D-H angles.
@@ -118,6 +121,16 @@ impl<'a, const N: usize> Predictor<'a, N> {
             let speed = found.surplus_nm * fallen * 2.0 * ratio * ratio / found.speed_rad_s
                 * found.speed_sigma_rad_s.unwrap_or(0.0);
             torques[joint].sigma = torques[joint].sigma.hypot(surplus).hypot(speed);
+        }
+        for (joint, torque) in torques.iter_mut().enumerate() {
+            let anatomy = &self.anatomy[joint];
+            let [load, speed] = [torque.rigid, state.qd[joint]].map(|value| anatomy.from_chain(value));
+            let angle = anatomy.angle_from_chain(state.q[joint]);
+            let ([spring, friction], sigma) =
+                additional_torque::added(&set.additional_torque, joint, load, angle, speed);
+            torque.rigid += anatomy.to_chain(spring);
+            torque.friction += anatomy.to_chain(friction);
+            torque.sigma = torque.sigma.hypot(sigma);
         }
         torques
     }

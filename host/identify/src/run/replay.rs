@@ -25,8 +25,10 @@ use crate::formats::leg_file::check::ACCEPTED_PERCENT;
 use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::Read;
 use crate::formats::recording::import::Import;
+use crate::leg::additional_torque::Additional;
 use crate::leg::background::Background;
 use crate::leg::setup::{DEFAULT_SEED, PriorChoice, background};
+use crate::report::model_choice::ModelChoiceReport;
 use crate::report::scale::{MassReport, ScaleReport};
 use crate::report::series::{Reader, Role, Series};
 use crate::report::{RunReport, Source};
@@ -36,11 +38,13 @@ use crate::run::resample::{PENDING, TAPS};
 use crate::with_leg_size;
 use judge::{Judged, judge};
 use logging_errors::{Subject, chosen_bandwidth, encoders, noise_density};
-use predictions::write_predictions;
+use predictions::{Prediction, write_predictions};
 use read::{Parts, parts};
 use rows::{Samples, bandwidth_error, new_recorder};
 use solve::{Solved, solve};
 
+/// Most identifications with additional torques after the first.
+const ROUNDS: usize = 4;
 /// Lowest bandwidth, tenths of a Hz.
 const LOWEST_TENTHS: u32 = 10;
 
@@ -171,11 +175,11 @@ fn replay_sized<const N: usize, const B: usize>(
     }
     let options = &options;
     let Some(payload) = &options.payload else {
-        return identified(leg, background, recordings, options, None);
+        return settled(leg, &background, recordings, options, None);
     };
     let known_mass::Found { scale, read, warnings } =
         known_mass::scale(leg, &background, recordings, options, payload)?;
-    let mut replayed = identified(leg, background, recordings, options, scale.trusted())?;
+    let mut replayed = settled(leg, &background, recordings, options, scale.trusted())?;
     replayed.run.read.get_or_insert_default().extend(read);
     replayed.warnings.extend(warnings);
     let used = core::array::from_fn(|joint| leg.joints[joint].torque_per_ampere);
@@ -183,7 +187,45 @@ fn replay_sized<const N: usize, const B: usize>(
     Ok(replayed)
 }
 
-/// Identifies; torques are divided by `scale`, recorded over true torque of each joint.
+/// An identification with what is needed for another.
+struct Identified<const N: usize> {
+    replayed: Replayed,
+    predictions: Vec<Prediction<N>>,
+    /// Additional torques with which to identify again.
+    additional: Option<Additional>,
+}
+
+/// Identifies, then again without the additional torques that the leg file demands or the misfit shows. Where
+/// the leg file leaves them to the data and the recordings are refused all the same, the first result holds.
+fn settled<const N: usize, const B: usize>(
+    leg: &LegFile,
+    background: &Background<N, B>,
+    recordings: &Recordings,
+    options: &ReplayOptions,
+    scale: Option<[ConstantRatio<f32>; N]>,
+) -> Result<Replayed, ToolError> {
+    let again =
+        |additional: &Additional| identified(leg, background.clone(), recordings, options, scale, additional);
+    let mut chosen = again(&Additional::default())?;
+    let mut next = chosen.additional.take();
+    for _ in 0..ROUNDS {
+        let Some(additional) = next.take() else { break };
+        let mut latest = again(&additional)?;
+        next = latest.additional.take();
+        let is_demanded =
+            latest.replayed.run.model_choice.iter().any(ModelChoiceReport::is_demanded_addition);
+        if is_demanded || latest.replayed.run.accepted() {
+            chosen = latest;
+        }
+    }
+    if let Some(path) = &options.csv {
+        write_predictions(path, &chosen.predictions, &anatomy::<N>(leg)?)?;
+    }
+    Ok(chosen.replayed)
+}
+
+/// Identifies; torques are divided by `scale`, recorded over true torque of each joint, and the additional
+/// ones subtracted.
 ///
 /// | stage | from | to |
 /// | --- | --- | --- |
@@ -198,12 +240,13 @@ fn identified<const N: usize, const B: usize>(
     recordings: &Recordings,
     options: &ReplayOptions,
     scale: Option<[ConstantRatio<f32>; N]>,
-) -> Result<Replayed, ToolError> {
+    additional: &Additional,
+) -> Result<Identified<N>, ToolError> {
     let started = Instant::now();
     let anatomy = anatomy::<N>(leg)?;
     let recorder = Box::new(new_recorder(options.bandwidth_hz)?);
     let ratios = scale.map_or([1.0; N], |scale| scale.map(|found| f64::from(found.ratio)));
-    let parts = parts(recordings, options, leg, &ratios)?;
+    let parts = parts(recordings, options, leg, &ratios, additional)?;
     let encoders = encoders(&parts.wholes, leg);
     encoders.describe(leg, options.bandwidth_hz, &mut background.model);
     encoders.describe(leg, options.bandwidth_hz, &mut background.device);
@@ -216,10 +259,8 @@ fn identified<const N: usize, const B: usize>(
 
     let mut solved = solve(&mut background, recorder, &training, &noise[0], options, scale);
     let accepted_error = options.accept_error_percent / 100.0;
-    let judged = judge(&background, &mut solved, &held_out, &noise[1], accepted_error);
-    if let Some(path) = &options.csv {
-        write_predictions(path, &judged.predictions, &anatomy)?;
-    }
+    let mut judged = judge(&background, &mut solved, &held_out, &noise[1], accepted_error);
+    let predictions = std::mem::take(&mut judged.predictions);
     let sources = solved.sources.iter().chain(&judged.sources).cloned().collect();
     let simulated_s = training.iter().chain(&held_out).map(Samples::duration_s).sum();
     let mut run = report(&background, &solved, judged, options, simulated_s);
@@ -236,16 +277,19 @@ fn identified<const N: usize, const B: usize>(
         noise: noise[0],
         screening: &parts.screening,
         load: solved.load.unwrap_or([0.0; B]),
+        additional,
         proposed_hz,
         stribeck_hz,
     };
-    warnings.extend(subject.examine(&mut run)?);
+    let examined = subject.examine(&mut run)?;
+    warnings.extend(examined.warning);
     run.scale.load = options.load.as_ref().map(MassReport::from);
     run.samples = Some(parts.screening.findings);
     run.read = Some(parts.read);
     run.wall_s = started.elapsed().as_secs_f64();
     let series = series(&background, &anatomy, &solved, options.bandwidth_hz, &training, &held_out)?;
-    Ok(Replayed { bandwidth_hz: options.bandwidth_hz, run, sources, series, warnings })
+    let replayed = Replayed { bandwidth_hz: options.bandwidth_hz, run, sources, series, warnings };
+    Ok(Identified { replayed, predictions, additional: examined.additional })
 }
 
 /// Doubts that do not change the result, each once: both parts of a file that is split give the same one.

@@ -60,7 +60,12 @@ impl BaseSet {
             })
             .unzip();
         let row = |row: &usize| kept.iter().map(|&column| detail.covariance[*row][column]).collect();
-        Self { covariance: kept.iter().map(row).collect(), parameters, stribeck: Vec::new() }
+        Self {
+            covariance: kept.iter().map(row).collect(),
+            parameters,
+            stribeck: Vec::new(),
+            additional_torque: run.additional_torque.clone(),
+        }
     }
 }
 

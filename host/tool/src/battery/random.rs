@@ -147,7 +147,10 @@ impl Sample {
             all[joint].torque_nm[k] += match kind {
                 "gain" => size * all[joint].torque_nm[k],
                 "crosstalk" => size * torques[k][other],
-                "load_friction" => size.abs() * rate.signum() * torque.abs(),
+                "load_friction" => {
+                    let friction = coulomb * rate.signum() + viscous * rate;
+                    size.abs() * rate.signum() * (torque - friction).abs()
+                }
                 "spring" => size.abs() * rms * states[k][0][joint],
                 "offset_drift" => size * rms * share,
                 "gain_drift" => size * share * torque,

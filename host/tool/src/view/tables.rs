@@ -7,7 +7,7 @@ use scarab_base::precision::{exact, plain, sigma, value};
 use scarab_base::table::{Cell, Table, cells};
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::disturbances::StribeckReport;
-use scarab_identify::report::findings::{FindingReport, untested_lengths};
+use scarab_identify::report::findings::{FindingReport, hardly_tested};
 use scarab_identify::report::series::Role;
 use scarab_identify::report::{
     AddedMassReport, BaseReport, ComparisonReport, ParameterReport, RunReport, Source, reading::ReadReport,
@@ -263,7 +263,7 @@ pub fn run_text(run: &RunReport, leg: &LegFile) -> String {
         lines.push("  not validated: no motion was held out (--validate, --split)".into());
     }
     if run.is_replay() {
-        lines.extend(untested_lengths(&run.findings).into_iter().map(|words| format!("  {words}")));
+        lines.extend(hardly_tested(run).into_iter().map(|words| format!("  {words}")));
     }
     lines.extend(run.compared.iter().flat_map(comparison_lines));
     lines.join("\n") + "\n"

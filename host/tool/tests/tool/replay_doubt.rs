@@ -456,17 +456,75 @@ fn a_misfit_within_the_accepted_error_is_a_verdict_of_its_own() {
     assert_contains(&message, "--accept-error: must be 0 to 70 percent");
 }
 
+/// Recording with friction by this share of the load at the knee.
+fn loaded(share: f64) -> Vec<[f64; 5]> {
+    let right = samples();
+    let mut loaded = right.clone();
+    for (row, pair) in loaded.iter_mut().skip(1).zip(right.windows(3)) {
+        let speed = (pair[2][2] - pair[0][2]) / (pair[2][0] - pair[0][0]);
+        // Friction of the plant's knee.
+        let load = row[4] - (2.0 * speed.signum() + 0.8 * speed);
+        row[4] += share * speed.signum() * load.abs();
+    }
+    loaded
+}
+
+#[test]
+fn a_spring_or_friction_by_load_is_estimated_where_it_explains_the_misfit() {
+    let (clean, _) = replay(&samples(), "", 0);
+    assert!(clean.get("additional_torque").is_none());
+    for (samples, kind, joint, size, line) in [
+        (added(|_, row| 80.0 * row[1]), "spring", 1, 80.0, "model, joint 1: spring on (auto): "),
+        (loaded(0.12), "load_friction", 2, 0.12, "model, joint 2: load_friction on (auto): "),
+    ] {
+        let folder = Folder::new();
+        folder.write("walk.csv", csv(&samples));
+        let arguments = "replay --split 0.666666 --csv @torque.csv --save-model @model.toml @walk.csv --leg";
+        let (run, report) = folder.reported(&format!("{arguments} mujoco-leg"), 0);
+        run.prints(line);
+        let found = &report["additional_torque"][0];
+        assert_eq!((found["kind"].as_str(), found["joint"].as_u64()), (Some(kind), Some(joint)));
+        let [value, sigma] = ["value", "sigma"].map(|key| number(&found[key]));
+        assert!((value - size).abs() < 4.0 * sigma, "{kind}: {value} +- {sigma}");
+        for name in NAMES.into_iter().filter(|name| *name != "OFF1") {
+            let [value, sigma, before] = [(&report, "value"), (&report, "sigma"), (&clean, "value")]
+                .map(|(report, key)| base(report, name, key));
+            assert!((value - before).abs() < 4.0 * sigma, "{kind}: {name} {value} +- {sigma}, not {before}");
+        }
+        // The model's torque contains it.
+        folder.write(
+            "states.csv",
+            "q1,q2,qd1,qd2,qdd1,qdd2\n0.5,0.8,0,0,0,0\n0.6,0.9,0,0,0,0\n0.5,0.8,1e-3,1e-3,0,0\n0.5,0.8,-1e-3,-1e-3,0,0\n",
+        );
+        folder.scarab("predict --model @model.toml --states @states.csv --out @predicted.csv").ends_with(0);
+        let torque = folder.table("predicted.csv").column(&format!("tau{joint}_Nm"));
+        let value = |name: &str| base(&report, name, "value");
+        let change = if kind == "spring" {
+            let [here, there] = [0.5, 0.6].map(scarab::real::sin_cos::<f64>);
+            let weight = value("HX1R") * (there.0 - here.0) + value("HY1") * (there.1 - here.1);
+            (torque[1] - torque[0] - 9.81 * weight) / 0.1
+        } else {
+            (0.5 * (torque[2] - torque[3]) - value("FC2")) / torque[0].abs()
+        };
+        assert!((change / size - 1.0).abs() < 0.2, "{kind}: {change}");
+        let leg = include_str!("../../../legs/mujoco-leg.toml")
+            .replace("[[joint]]", "[[joint]]\nspring = \"off\"\nload_friction = \"off\"");
+        folder.write("off.toml", leg);
+        let run = folder.scarab("replay --split 0.666666 @walk.csv --leg @off.toml");
+        run.prints(&format!("likely cause: {}", kind.replace('_', " ")));
+    }
+}
+
 /// Damage of a size from 0 to 1.
 type Damage = fn(f64) -> Vec<[f64; 5]>;
 
 #[test]
 #[ignore = "campaign: .ci/full"]
 fn more_damage_is_never_judged_milder() {
-    let kinds: [(&str, Damage); 8] = [
+    let kinds: [(&str, Damage); 7] = [
         ("offset drift", |size| added(|share, _| 30.0 * size * share)),
         ("torque drift", |size| added(|share, row| size * share * row[3])),
         ("step", |size| added(|share, _| if share > 0.5 { 20.0 * size } else { 0.0 })),
-        ("spring", |size| added(|_, row| 30.0 * size * row[1])),
         ("vibration", |size| added(|_, row| 10.0 * size * scarab::real::sin_cos(6.0 * row[0]).0)),
         ("drive of the knee at the base", |size| added(|_, row| -size * row[4])),
         ("torque scale", |size| added(|_, row| 0.5 * size * row[3])),

@@ -25,6 +25,11 @@ impl Switch {
     }
 
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+    pub(super) const fn is_auto(&self) -> bool {
+        matches!(self, Self::Auto)
+    }
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
     pub(super) const fn is_off(&self) -> bool {
         matches!(self, Self::Off)
     }

@@ -94,7 +94,9 @@ fn base_set(model: &ModelFile) -> Checked {
             return Err(fault(&steps, format!("`{}` carries two base parameters", base.carrier)));
         }
         for (name, factor) in &base.terms {
-            known(model, name, &steps)?;
+            if !model.is_rest(name) {
+                known(model, name, &steps)?;
+            }
             if !factor.is_finite() {
                 return Err(fault(&steps, format!("the factor of `{name}` is {factor}")));
             }
@@ -121,6 +123,15 @@ fn base_set(model: &ModelFile) -> Checked {
         if let Some(sigma) = sigmas.into_iter().flatten().find(|sigma| !(*sigma >= 0.0 && sigma.is_finite()))
         {
             return Err(fault(&steps, format!("a standard deviation is {sigma}; it must be 0 or more")));
+        }
+    }
+    for (number, torque) in set.additional_torque.iter().enumerate() {
+        let steps = [Step::Key("base_set"), Step::Key("additional_torque"), Step::Entry(number)];
+        if !(1..=model.leg.joints.len()).contains(&torque.joint) {
+            return Err(fault(&steps, format!("joint {} does not exist", torque.joint)));
+        }
+        if !(torque.value.is_finite() && torque.sigma >= 0.0 && torque.sigma.is_finite()) {
+            return Err(fault(&steps, "`value` must be finite, `sigma` 0 or more"));
         }
     }
     covariance(set)

@@ -47,6 +47,9 @@ impl ModelFile {
         if !self.base_set.stribeck.is_empty() {
             lines(&mut out, "stribeck", &self.base_set.stribeck);
         }
+        if !self.base_set.additional_torque.is_empty() {
+            lines(&mut out, "additional_torque", &self.base_set.additional_torque);
+        }
         out += "\n[full_set]\n";
         lines(&mut out, "parameters", &self.full_set.parameters);
         out

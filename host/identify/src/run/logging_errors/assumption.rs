@@ -8,7 +8,7 @@
 //! link_length j     Y of a leg whose link before joint j is longer than the file states
 //! torque_clock      torque(t + d + r t) = Y p    the torque falls behind the angle by the share r of time
 //! crosstalk i, j    torque_i = Y_i p + c torque_j      c near one: the drive of joint j sits elsewhere
-//! load_friction     torque_j = Y_j p + c_j sign(qd_j) |Y_j p|    (Hamon, Gautier and Garrec 2010)
+//! load_friction     torque_j = Y_j p + c_j sign(qd_j) |load_j|   (`additional_torque`)
 //! changed_midway j  torque_j = Y_j p + c after a time      the best of a grid; a gain: midway.rs
 //! ```
 //!
@@ -19,8 +19,10 @@
 use nalgebra::Vector3;
 use scarab::real::dot;
 
+use crate::report::additional_torque::AdditionalKind;
 use crate::report::doubt::CauseReport;
-use crate::run::logging_errors::fit::{Score, segment_sigma, solve};
+use crate::run::logging_errors::beside::{Beside, LISTED, additional, beside, significance};
+use crate::run::logging_errors::fit::Score;
 use crate::run::logging_errors::lag::least;
 use crate::run::logging_errors::midway::{POINTS, is_after};
 use crate::run::logging_errors::regressor::Instant;
@@ -41,8 +43,6 @@ const DIFFERENCE: f64 = 1e-4;
 const LARGEST_LENGTH: f64 = 0.35;
 /// Share of another joint's torque, apart from one, up to which a whole torque is added.
 const WHOLE: f64 = 0.1;
-/// Significance from which a joint's friction by load is listed.
-const LISTED: f64 = 3.0;
 
 /// All assumptions, each replaced alone.
 pub(crate) fn all(question: &Question, equations: &Equations) -> Vec<Refitted> {
@@ -75,7 +75,7 @@ pub(crate) fn all(question: &Question, equations: &Equations) -> Vec<Refitted> {
             .filter(move |&other| other != one)
             .map(move |other| crosstalk(question, equations, one, other))
     }));
-    found.push(load_friction(equations));
+    found.push(load_friction(question, equations));
     found.extend(torque_clock(equations));
     found.extend((0..joints).filter_map(|joint| offset_step(question, equations, joint)));
     found
@@ -125,39 +125,12 @@ fn replaced(equations: &Equations, cause: CauseReport, columns: Table) -> Refitt
     Refitted { cause, values, columns, torque, significance: f64::INFINITY }
 }
 
-fn significance((value, sigma): (f64, f64)) -> f64 {
-    value.abs() / sigma.max(1e-300)
-}
-
-/// Further columns beside the parameters, each with its value and standard deviation.
-fn beside(equations: &Equations, torque: Vec<f64>, further: &[Vec<f64>]) -> (Refitted, Vec<(f64, f64)>) {
-    let rank = equations.active.len();
-    let rows = equations.columns.rows().enumerate();
-    let columns = Table::of_rows(
-        rank + further.len(),
-        rows.map(|(index, row)| {
-            row.iter().copied().chain(further.iter().map(|column| column[index])).collect::<Vec<f64>>()
-        }),
-    );
-    let active: Vec<bool> = equations.active.iter().copied().chain(further.iter().map(|_| true)).collect();
-    let fit = solve(&columns, &torque, &equations.weight, &active);
-    let scatter = segment_sigma(&fit, &columns, &torque, &equations.weight, &equations.clusters());
-    // The weights are those of the misfit without the columns.
-    let plain = equations.fit(&equations.columns, &torque, false).cost;
-    let remaining = (fit.cost / plain.max(1e-300)).min(1.0).sqrt();
-    let found: Vec<(f64, f64)> = (rank..rank + further.len())
-        .map(|at| (fit.values[at], scatter[at].max(remaining * fit.inverse[at][at].max(0.0).sqrt())))
-        .collect();
-    let significance = found.iter().map(|found| significance(*found)).fold(0.0, f64::max);
-    (Refitted { cause: CauseReport::default(), values: fit.values, columns, torque, significance }, found)
-}
-
 /// A torque that contains part of another joint's, or all of it.
 fn crosstalk(question: &Question, equations: &Equations, one: usize, other: usize) -> Refitted {
     let torques = equations.torques_of(&|instant| instant.torque[one] = instant.torque[other]);
     let pairs = torques.iter().zip(&equations.sources);
     let column = pairs.map(|(torque, source)| if source.joint == one { *torque } else { 0.0 }).collect();
-    let (refitted, found) = beside(equations, equations.torque.clone(), &[column]);
+    let Beside { refitted, found, .. } = beside(equations, equations.torque.clone(), &[column]);
     // Torques of the file, which a reversed joint counts the other way.
     let sign = [one, other].map(|joint| question.anatomy[joint].from_chain(1.0).signum());
     let (value, sigma) = (found[0].0 * sign[0] * sign[1], found[0].1);
@@ -223,20 +196,9 @@ fn link_length(equations: &Equations, joint: usize) -> Option<Refitted> {
 }
 
 /// Friction that grows with the torque that the gear transmits, of all joints.
-fn load_friction(equations: &Equations) -> Refitted {
-    let values = equations.fit(&equations.columns, &equations.torque, false).values;
-    let load = equations.torques_of(&|instant| {
-        let rows = equations.regressor.rows(instant);
-        for (joint, row) in rows.rows().enumerate() {
-            instant.torque[joint] = instant.velocity[joint].signum() * dot(row, &values).abs();
-        }
-    });
-    let column = |joint: usize| -> Vec<f64> {
-        let pairs = load.iter().zip(&equations.sources);
-        pairs.map(|(load, source)| if source.joint == joint { *load } else { 0.0 }).collect()
-    };
-    let columns: Vec<Vec<f64>> = (0..equations.joints()).map(column).collect();
-    let (refitted, found) = beside(equations, equations.torque.clone(), &columns);
+pub(crate) fn load_friction(question: &Question, equations: &Equations) -> Refitted {
+    let joints = (0..equations.joints()).map(|joint| (joint, AdditionalKind::LoadFriction));
+    let Beside { refitted, found, .. } = additional(question, equations, &joints.collect::<Vec<_>>());
     let listed: Vec<usize> = (0..found.len()).filter(|&joint| significance(found[joint]) > LISTED).collect();
     let words: Vec<String> = listed
         .iter()
@@ -247,12 +209,12 @@ fn load_friction(equations: &Equations) -> Refitted {
         .collect();
     let only = (listed.len() == 1).then(|| listed[0]);
     let cause = CauseReport {
-        name: "load_friction",
+        name: AdditionalKind::LoadFriction.name(),
         joint: only.map(|joint| joint + 1),
         value: only.map(|joint| 100.0 * found[joint].0).into(),
         sigma: only.map(|joint| 100.0 * found[joint].1).into(),
         words: format!(
-            "friction grows with the torque, which the model does not describe: {}",
+            "friction grows with the torque: {}",
             if words.is_empty() { "hardly".into() } else { words.join(", ") }
         ),
         ..CauseReport::default()
@@ -278,7 +240,7 @@ fn torque_clock(equations: &Equations) -> Option<Refitted> {
         let slopes: Vec<f64> = rates.iter().map(|rate| -rate).collect();
         let drifting = slopes.iter().zip(&equations.sources);
         let drifting = drifting.map(|(slope, source)| slope * equations.time_from_middle_s(source)).collect();
-        let (refitted, found) = beside(equations, torque, &[slopes, drifting]);
+        let Beside { refitted, found, .. } = beside(equations, torque, &[slopes, drifting]);
         step += 1;
         if step < STEPS {
             late = [late[0] + found[0].0, late[1] + found[1].0];
@@ -323,7 +285,7 @@ fn offset_step(question: &Question, equations: &Equations, joint: usize) -> Opti
         score.delta * score.delta * dot(&score.column, &score.column)
     };
     let best = points.map(|point| (point, gain(point))).max_by(|one, other| one.1.total_cmp(&other.1))?.0;
-    let (refitted, found) = beside(equations, equations.torque.clone(), &[column(best)]);
+    let Beside { refitted, found, .. } = beside(equations, equations.torque.clone(), &[column(best)]);
     let value = question.anatomy[joint].from_chain(found[0].0);
     let sigma = found[0].1;
     let cause = CauseReport {

@@ -231,9 +231,14 @@ impl Found {
     /// Variance that a possible error adds to each parameter: the shift, reduced by the part that chance
     /// explains.
     pub(crate) fn variance(&self) -> impl Iterator<Item = f64> + '_ {
-        let certain = (1.0 - (2.0 / self.significance().max(1e-9)).powi(2)).max(0.0);
+        let certain = certain(self.significance());
         self.shift.iter().map(move |shift| shift * shift * certain)
     }
+}
+
+/// Part of an error of this significance that chance does not explain, 0..1.
+pub(crate) fn certain(significance: f64) -> f64 {
+    (1.0 - (2.0 / significance.max(1e-9)).powi(2)).max(0.0)
 }
 
 /// Standard deviations that a fall of the cost from `without` to `with` is worth. The weights are those of

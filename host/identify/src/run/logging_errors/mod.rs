@@ -10,6 +10,7 @@
 //! | [`regressor`] | the leg's regressor behind an interface without its size |
 //! | [`rows`] | filtered rows of whole recordings in double precision, weights |
 //! | [`fit`] | least squares, a further column beside it, both standard deviations |
+//! | [`beside`] | several further columns; springs and friction by load |
 //! | [`directions`] | delay, encoder scale, torque scale, gravity, springs, drifts |
 //! | [`lag`] | low-pass or delay of the torque as a cause |
 //! | [`assumption`] | clocks, weight, lengths, absolute angles, crosstalk, friction by load as a cause |
@@ -25,6 +26,7 @@
 //! Runs on the host only.
 
 pub(crate) mod assumption;
+pub(crate) mod beside;
 pub(crate) mod cause;
 pub(crate) mod corrections;
 pub(crate) mod directions;
@@ -50,7 +52,7 @@ use scarab_base::number::Number;
 
 use crate::report::doubt::{CauseReport, DirectionReport, DoubtReport, SampleFinding};
 use crate::report::findings::FindingReport;
-use directions::{CHANCE, Directions, Found};
+use directions::{CHANCE, Directions, Found, certain};
 use encoder::{Bias, Encoders, LARGEST_NOISE, LARGEST_SHARE};
 use midway::Midway;
 use regressor::Regressor;
@@ -102,6 +104,12 @@ impl Question {
     /// Chain angles of the joints' zeros, rad.
     pub(crate) fn zero(&self) -> Vec<f64> {
         self.anatomy.iter().map(|joint| joint.zero_offset()).collect()
+    }
+
+    /// Equations of every column, whatever the data chose; `None` with too few rows.
+    pub(crate) fn equations_of_all_columns(&self) -> Option<Equations> {
+        let all = Self { active: vec![true; self.active.len()], ..self.clone() };
+        all.equations(&all.motions).ok().flatten()
     }
 
     /// This input with every column and without Stribeck friction; `None` if nothing changes.
@@ -273,6 +281,11 @@ impl LoggingErrors {
             for (sigma, variance) in sigma.iter_mut().zip(found.variance()) {
                 sigma.logging = sigma.logging.hypot(variance.sqrt());
             }
+        }
+        let load = assumption::load_friction(question, &equations);
+        let plain = equations.fit(&equations.columns, &equations.torque, false).values;
+        for (sigma, (with, without)) in sigma.iter_mut().zip(load.values.iter().zip(plain)) {
+            sigma.logging = sigma.logging.hypot((with - without) * certain(load.significance).sqrt());
         }
         let midway = midway::find(&equations);
         let weight = weight(&equations);

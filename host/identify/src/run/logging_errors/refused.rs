@@ -27,6 +27,8 @@ const TENTH: f64 = 0.1;
 const EQUAL: f64 = 1.1;
 /// Largest number of possible causes that are listed.
 const LISTED: usize = 3;
+/// Misfit over the torque of a leg in whose columns no unit is wrong.
+const ALMOST: f64 = 0.05;
 /// Misfit over the torque up to which one correction may be all that is wrong.
 const SMALL_MISFIT: f64 = 0.2;
 
@@ -144,8 +146,13 @@ impl<'a> Refused<'a> {
     }
 
     /// Whether a cause is named alone. A torque unlike the prior's shows an error whatever else is wrong.
-    /// Samples that are read in another way must fit as well as the refused leg.
+    /// Samples that are read in another way must fit as well as the refused leg. A leg that almost fits has
+    /// no wrong unit.
     pub(super) fn is_named_alone(&self, tried: &Tried) -> bool {
+        let almost_fits = self.agrees && self.quality.sound && self.quality.remaining() < ALMOST;
+        if almost_fits && !tried.cause.reads.is_empty() {
+            return false;
+        }
         let fits = tried.quality.remaining() < SMALL_MISFIT.max(EQUAL * self.quality.remaining());
         let (least, fits) = if tried.is_exact { (EXACT, fits) } else { (HALF, true) };
         fits && (self.explained(tried) >= least || !self.agrees)

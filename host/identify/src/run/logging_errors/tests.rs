@@ -3,10 +3,11 @@
 use nalgebra::Vector3;
 use scarab::ident::{LinkPrior, RowModel, Smoothed, prior_parameters};
 use scarab::model::{
-    AnatomicalJoint, BaseParameters, Chain, DenavitHartenberg, PARAMETERS_PER_JOINT, RigidBody,
+    AnatomicalJoint, BaseParameters, Chain, DenavitHartenberg, PARAMETERS_PER_JOINT, Parameter, RigidBody,
 };
 use scarab_base::random::Random;
 
+use crate::report::additional_torque::AdditionalKind;
 use crate::run::logging_errors::*;
 
 const NOISE_NM: f64 = 0.3;
@@ -318,7 +319,8 @@ fn with_torques(change: impl Fn(f64, &Smoothed<f64, 2>, &mut [f64])) -> Question
 #[test]
 fn assumptions_that_fail_are_found_at_their_size() {
     let load = |torques: &mut [f64], motion: &Smoothed<f64, 2>, joint: usize, share: f64| {
-        torques[joint] += share * motion.velocity[joint].signum() * torques[joint].abs();
+        let (sign, viscous) = (motion.velocity[joint].signum(), motion.velocity[joint]);
+        torques[joint] += share * sign * (torques[joint] - 2.0 * sign - viscous).abs();
     };
     // The torque falls behind by this share of the time.
     let late = |rate: f64| {
@@ -395,6 +397,33 @@ fn a_spring_beside_the_drive_is_found_at_its_size() {
     assert_eq!((cause.name, cause.joint), ("spring", Some(2)), "{}", cause.words);
     let (found, sigma) = (cause.value.known().expect("a size"), cause.sigma.known().expect("a size"));
     assert!((found - 15.0).abs() < 4.0 * sigma, "{found} +- {sigma}");
+}
+
+#[test]
+fn a_spring_and_friction_by_load_are_fitted_together_with_what_they_cost() {
+    let question = with_torques(|_, motion, torques| {
+        let (sign, speed) = (motion.velocity[0].signum(), motion.velocity[0]);
+        let load = torques[0] - 2.0 * sign - speed + 15.0 * motion.position[0];
+        torques[0] = load + 0.1 * sign * load.abs() + 2.0 * sign + speed;
+    });
+    let wanted =
+        [(0, AdditionalKind::Spring), (0, AdditionalKind::LoadFriction), (1, AdditionalKind::Spring)];
+    let equations = question.equations_of_all_columns().expect("enough rows");
+    let beside = beside::additional(&question, &equations, &wanted);
+    for ((value, sigma), truth) in beside.found.iter().zip([15.0, 0.1, 0.0]) {
+        assert!((value - truth).abs() < 4.0 * sigma + 0.02 * truth, "{value} +- {sigma}, not {truth}");
+    }
+    // A spring of joint 1 costs most of the knowledge of its weight.
+    let plain = equations.fit(&equations.columns, &equations.torque, false);
+    let truth = question.prior.as_ref().expect("a prior");
+    for (base, truth) in truth.iter().enumerate() {
+        let sigma = plain.inverse[base][base].sqrt().hypot(beside.widths[base]);
+        let error = beside.refitted.values[base] - truth;
+        assert!(error.abs() < 4.0 * sigma + 0.02 * truth.abs(), "{base}: {error} +- {sigma}");
+    }
+    let weight = (0..truth.len()).find(|&base| question.regressor.carrier(base) == Some((0, Parameter::HX)));
+    let weight = weight.expect("a moment of joint 1");
+    assert!(beside.widths[weight] > 3.0 * plain.inverse[weight][weight].sqrt());
 }
 
 /// Adds to the torque of the first joint, from the share of the recording and the undamaged torques and

@@ -16,6 +16,7 @@ use super::{Recordings, ReplayOptions};
 use crate::formats::leg_file::LegFile;
 use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::recording::Read;
+use crate::leg::additional_torque::Additional;
 use crate::leg::background::Background;
 use crate::report::reading::ReadReport;
 use crate::run::replay::screening::refuse_copies;
@@ -84,7 +85,8 @@ fn record<const N: usize, const B: usize>(
     options: &ReplayOptions,
 ) -> Result<(Record<f32, N, B>, Vec<String>), ToolError> {
     let anatomy = anatomy::<N>(leg)?;
-    let Parts { training, screening, read, .. } = parts(recordings, options, leg, &[1.0; N])?;
+    let Parts { training, screening, read, .. } =
+        parts(recordings, options, leg, &[1.0; N], &Additional::default())?;
     let mut recorder = Box::new(new_recorder::<N, B>(options.bandwidth_hz)?);
     recorder.set_estimator(options.estimator);
     let samples: Vec<Samples<N>> =

@@ -1,5 +1,6 @@
 //! Checks the recordings of a replay for errors of the logging chain, and adds the results to its report.
 
+mod additional;
 mod units;
 
 use std::ops::Range;
@@ -16,6 +17,7 @@ use scarab_base::stats::quantile;
 use crate::formats::leg_file::geometry::anatomy;
 use crate::formats::leg_file::{JointFile, LegFile};
 use crate::formats::recording::Recording;
+use crate::leg::additional_torque::Additional;
 use crate::leg::background::Background;
 use crate::report::doubt::{BandwidthReport, CauseReport, ReadAs, RecordingsReport};
 use crate::report::findings::FindingReport;
@@ -134,7 +136,7 @@ pub(super) fn chosen_bandwidth<const N: usize, const B: usize>(
     recordings: &Recordings,
     options: &ReplayOptions,
 ) -> Result<f64, ToolError> {
-    let Parts { wholes, screening, .. } = parts(recordings, options, leg, &[1.0; N])?;
+    let Parts { wholes, screening, .. } = parts(recordings, options, leg, &[1.0; N], &Additional::default())?;
     let robust = options.estimator == scarab::ident::Estimator::Robust;
     let (motions, _) = motions(&wholes, &anatomy::<N>(leg)?, robust, &screening);
     let encoders = encoders(&wholes, leg);
@@ -149,6 +151,13 @@ pub(super) fn chosen_bandwidth<const N: usize, const B: usize>(
     encoders.bandwidth_hz(largest_hz, rows).map_err(|error| bandwidth_error(options.bandwidth_hz, error))
 }
 
+/// What an examination says besides the report.
+pub(super) struct Examined {
+    pub(super) warning: Option<String>,
+    /// Additional torques with which the recordings are to be identified again.
+    pub(super) additional: Option<Additional>,
+}
+
 /// Data for all checks of the recordings.
 pub(super) struct Subject<'a, const N: usize, const B: usize> {
     pub(crate) leg: &'a LegFile,
@@ -161,6 +170,8 @@ pub(super) struct Subject<'a, const N: usize, const B: usize> {
     pub(crate) screening: &'a Screening,
     /// Base parameters of a known load, which the recorded torque contains.
     pub(crate) load: [f32; B],
+    /// Torques that were subtracted.
+    pub(crate) additional: &'a Additional,
     /// Larger bandwidth that the encoders allow.
     pub(crate) proposed_hz: Option<f64>,
     /// Largest bandwidth of the Stribeck search, where the encoders are too coarse for it.
@@ -168,15 +179,20 @@ pub(super) struct Subject<'a, const N: usize, const B: usize> {
 }
 
 impl<const N: usize, const B: usize> Subject<'_, N, B> {
-    /// Adds directions, sigma, tests and the likely cause of a refusal to the report.
-    pub(super) fn examine(&self, run: &mut RunReport) -> Result<Option<String>, ToolError> {
+    /// Adds directions, sigma, tests and the likely cause of a refusal to the report. Returns a warning, and
+    /// other additional torques to subtract.
+    pub(super) fn examine(&self, run: &mut RunReport) -> Result<Examined, ToolError> {
         let samples = &self.screening.findings;
         let (question, file_of) = self.question();
         let mut errors = LoggingErrors::fit(&question)
             .map_err(|error| bandwidth_error(self.options.bandwidth_hz, error))?;
         let mut report = errors.as_ref().map(LoggingErrors::report).unwrap_or_default();
+        let mut refined = None;
         if let Some(errors) = &mut errors {
             report.recordings = self.between_recordings(errors, &file_of);
+            run.additional_torque = self.additional.torques.clone();
+            report.unseen_springs = self.unseen_springs(&question, errors);
+            refined = self.refined(run, &question, errors);
             self.widen(run, errors);
             run.findings.extend(errors.findings());
             run.findings.extend(cause::in_degrees(&question, errors).map(|found| {
@@ -226,7 +242,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         if let (ACCEPTED_WITH_MISFIT, Some(errors)) = (run.verdict, &mut errors) {
             self.explain_misfit(run, &question, errors);
         }
-        Ok(warning)
+        Ok(Examined { warning, additional: self.wanted(run, &question).or(refined) })
     }
 
     /// Names what explains the misfit of an accepted leg, and adds its effect on the parameters to sigma.

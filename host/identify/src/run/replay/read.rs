@@ -6,6 +6,7 @@ use super::screening::{Screening, refuse_copies};
 use super::{Recordings, ReplayOptions};
 use crate::formats::leg_file::LegFile;
 use crate::formats::recording::{JointSeries, Read, Recording};
+use crate::leg::additional_torque::Additional;
 use crate::report::reading::ReadReport;
 
 /// Whole recording, with the duration of its training part.
@@ -92,26 +93,30 @@ pub(super) struct Parts {
     pub(super) read: Vec<ReadReport>,
 }
 
-/// Corrects all recordings, examines them, and splits them as requested.
+/// Corrects all recordings, examines them, subtracts the `additional` torques, and splits them as requested.
 pub(super) fn parts(
     recordings: &Recordings,
     options: &ReplayOptions,
     leg: &LegFile,
     ratios: &[f64],
+    additional: &Additional,
 ) -> Result<Parts, ToolError> {
     let of = |reads: &[Read]| -> Result<Vec<Recording>, ToolError> {
         reads.iter().map(|read| corrected(read.recording.clone(), options, ratios)).collect()
     };
     let (mut training, mut held_out) = (of(&recordings.training)?, of(&recordings.held_out)?);
     let read = recordings.training.iter().chain(&recordings.held_out).map(|read| read.report.clone());
+    refuse_copies(&training, &held_out, "--validate")?;
+    let all: Vec<&Recording> = training.iter().chain(&held_out).collect();
+    let screening = Screening::new(&all, leg, options.bandwidth_hz);
+    for recording in training.iter_mut().chain(&mut held_out) {
+        additional.subtract(recording);
+    }
     let share =
         |recording: &Recording| options.split.map_or(f64::INFINITY, |share| share * recording.duration_s());
     let whole = |recording: &Recording, training_s| Whole { recording: recording.clone(), training_s };
     let mut wholes: Vec<Whole> = training.iter().map(|file| whole(file, share(file))).collect();
     wholes.extend(held_out.iter().map(|file| whole(file, 0.0)));
-    refuse_copies(&training, &held_out, "--validate")?;
-    let all: Vec<&Recording> = training.iter().chain(&held_out).collect();
-    let screening = Screening::new(&all, leg, options.bandwidth_hz);
     if let Some(fraction) = options.split {
         let parts = training.iter().map(|whole| whole.split(fraction)).collect::<Result<Vec<_>, _>>()?;
         let (first, rest): (Vec<_>, Vec<_>) = parts.into_iter().unzip();

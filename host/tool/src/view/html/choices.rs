@@ -55,6 +55,8 @@ fn term(option: &str) -> &str {
         "offset" => "torque offset",
         "stribeck" => "Stribeck friction",
         "asymmetric_coulomb" => "Coulomb friction by direction",
+        "spring" => "spring beside the drive",
+        "load_friction" => "friction by load",
         other => other,
     }
 }

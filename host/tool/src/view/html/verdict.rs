@@ -5,7 +5,7 @@ use scarab_base::number::Number;
 use scarab_base::table::{Table, cells};
 use scarab_identify::formats::leg_file::LegFile;
 use scarab_identify::report::RunReport;
-use scarab_identify::report::findings::{FindingReport, untested_lengths};
+use scarab_identify::report::findings::{FindingReport, hardly_tested};
 
 use crate::view::html::table::ToHtml;
 use crate::view::html::{count, exact, joint_name, number};
@@ -24,7 +24,7 @@ pub(crate) fn banner(run: &RunReport) -> Markup {
                     ", and predicts the motions that were not used"
                 } ". " (passed(run)) }
                 @if run.is_replay() {
-                    @for words in untested_lengths(&run.findings) { p { strong { "Hardly tested: " } (words) "." } }
+                    @for words in hardly_tested(run) { p { strong { "Hardly tested: " } (words) "." } }
                 }
                 @if let Some(ratio) = misfit {
                     p.warning { strong { "Warning: " } (tables::misfit(ratio)) ". The torque holds something that the model does not, \
