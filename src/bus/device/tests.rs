@@ -505,6 +505,18 @@ fn a_reset_node_restarts_once_even_on_a_full_bus() {
 }
 
 #[test]
+fn only_emergency_and_boot_up_messages_are_sent_once() {
+    let bench = Bench::new();
+    let once = |id: u16, data: &[u8]| bench.device.reports_once(&Frame::new(id, data));
+    assert!([0x081, 0x082].into_iter().all(|id| once(id, &[0; 8])));
+    assert!([0x701, 0x702].into_iter().all(|id| once(id, &[0])));
+    // Heartbeats, process data, SDO answers, and another node's messages.
+    assert!(![0x701, 0x702].into_iter().any(|id| once(id, &[5])));
+    assert!(![0x181, 0x281, 0x581, 0x582, 0x083].into_iter().any(|id| once(id, &[0; 8])));
+    assert!(!once(0x703, &[0]));
+}
+
+#[test]
 fn storing_while_the_other_node_resets_stores_its_old_parameters() {
     let mut bench = Bench::new();
     bench.write(1, 0x6065, 0, 12_345, 4);

@@ -6,6 +6,7 @@ use crate::hal::CURRENT_RATE_HZ;
 use crate::motor::testing::{CONFIGURATION, TestMotor};
 use crate::motor::{Axis, AxisRequest};
 use crate::testing::TestRandom;
+use crate::units::{Henry, Ohm};
 
 pub(crate) const SETTINGS: CalibrationSettings = CalibrationSettings {
     current: Ampere(20.0),
@@ -522,4 +523,26 @@ fn settings_that_ask_for_too_much_are_refused() {
     assert_eq!(refused(|s| s.current.0 = f32::NAN), AxisError::Current);
     assert_eq!(refused(|s| s.voltage.0 = 30.0), AxisError::Current);
     assert_eq!(refused(|s| s.turns_per_s = 0.0), AxisError::Current);
+}
+
+#[test]
+fn a_held_voltage_described_in_another_frame_stays_where_it_is() {
+    let motor = MotorConstants {
+        resistance: Ohm(0.05),
+        direct_inductance: Henry(2e-5),
+        quadrature_inductance: Henry(2e-5),
+        flux: Weber::ZERO,
+    };
+    let gains = CurrentGains::new(&motor, SCAN_BANDWIDTH, false).expect("a plausible motor");
+    let held = FieldCurrent::holding(gains, Volt(2.0));
+    let stationary = |field: FieldCurrent, frame: f32| {
+        let Rotating { d, q } = field.current_loop.integral_v();
+        Rotating { d: Volt(d), q: Volt(q) }.to_stationary(ElectricalAngle::from_turns(frame).rotation())
+    };
+    let before = stationary(held, 0.3);
+    for back in [0.1, 0.25, -0.4] {
+        let after = stationary(held.turned(ElectricalAngle::from_turns(back)), 0.3 - back);
+        let error = [after.alpha - before.alpha, after.beta - before.beta];
+        assert!(error.iter().all(|error| error.0.abs() < 1e-5), "{back}: {after:?}, not {before:?}");
+    }
 }

@@ -302,8 +302,32 @@ fn another_clock_and_a_torque_without_weight_are_named() {
     }
     let mut weightless = model();
     weightless.gravity = Vector3::zeros();
-    let damaged = motion_of(&weightless, [0.0; 2], 1);
-    assert_eq!(cause_of(&question(vec![damaged])).name, "no_gravity");
+    let damaged = question(vec![motion_of(&weightless, [0.0; 2], 1)]);
+    assert_eq!(cause_of(&damaged).name, "no_gravity");
+    let refuses = |question: &Question| {
+        let findings = errors(question).findings();
+        findings.iter().find(|finding| finding.test == NO_GRAVITY).map(|finding| !finding.passed)
+    };
+    assert_eq!(refuses(&damaged), Some(true));
+    assert_eq!(refuses(&question(vec![motion([0.0; 2], 1)])), Some(false));
+}
+
+#[test]
+fn a_leg_about_vertical_axes_is_not_asked_for_weight() {
+    // Gravity that is entered with an error of some degrees acts across the axes too.
+    let mut lying = model();
+    lying.gravity = Vector3::new(0.5, 0.0, 9.8);
+    let found = errors(&question_of(lying.clone(), vec![motion_of(&lying, [0.0; 2], 1)]));
+    assert!(found.findings().iter().all(|finding| finding.test != NO_GRAVITY));
+}
+
+#[test]
+fn a_change_within_one_of_several_recordings_is_named_with_its_number() {
+    let mut second = motion([0.0; 2], 2);
+    second.torque.rows_mut().skip(5000).for_each(|torques| torques[1] += 4.0);
+    let cause = cause_of(&question(vec![motion([0.0; 2], 1), second]));
+    assert_eq!((cause.name, cause.joint), ("changed_midway", Some(2)), "{}", cause.words);
+    assert!(cause.words.contains("of recording 2"), "{}", cause.words);
 }
 
 /// Changes the torques of every sample, from its time, s, and its motion.
