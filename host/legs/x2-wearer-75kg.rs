@@ -73,6 +73,7 @@ pub const LEG: LegDescription<2> = LegDescription {
                 rotor: On,
                 constant: On,
                 meaning: Offset,
+                within_nm: None,
             },
             stribeck: Auto,
             motor: MotorDescription {
@@ -141,6 +142,7 @@ pub const LEG: LegDescription<2> = LegDescription {
                 rotor: On,
                 constant: On,
                 meaning: Offset,
+                within_nm: None,
             },
             stribeck: Auto,
             motor: MotorDescription {

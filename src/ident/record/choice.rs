@@ -34,7 +34,7 @@ pub enum Constant {
 }
 
 /// Choices for one joint's drive: what to estimate and what may be dropped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveChoice {
     /// Rotor inertia.
     pub rotor: Choice,
@@ -42,11 +42,14 @@ pub struct DriveChoice {
     pub constant: Choice,
     /// Interpretation of the constant part.
     pub meaning: Constant,
+    /// Standard deviation of the constant part about zero by knowledge of the drive, N m.
+    pub within_nm: Option<f32>,
 }
 
 impl DriveChoice {
     /// Everything estimated, the constant part as an offset.
-    pub const ALL: Self = Self { rotor: Choice::On, constant: Choice::On, meaning: Constant::Offset };
+    pub const ALL: Self =
+        Self { rotor: Choice::On, constant: Choice::On, meaning: Constant::Offset, within_nm: None };
 }
 
 /// Treatment of disturbances in a motion.

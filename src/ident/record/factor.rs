@@ -37,7 +37,7 @@ impl<T: Real, const B: usize> Factor<T, B> {
     }
 
     /// Takes one row of a factor made elsewhere, without counting it.
-    pub(super) fn absorb(&mut self, row: &[T; B], right: T) {
+    pub(in crate::ident) fn absorb(&mut self, row: &[T; B], right: T) {
         self.rotate(*row, right);
     }
 

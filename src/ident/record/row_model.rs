@@ -97,6 +97,14 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
         rows
     }
 
+    /// Base parameters that are known to be zero, each with its standard deviation, N m.
+    pub fn known_to_be_zero(&self) -> impl Iterator<Item = (usize, T)> + '_ {
+        self.drive_choice.iter().enumerate().filter_map(|(joint, choice)| {
+            let within = T::from_double(f64::from(choice.within_nm?));
+            Some((self.drive(joint, Parameter::OFF)?, within))
+        })
+    }
+
     /// Index of the base parameter that stands for this parameter of a joint.
     pub fn drive(&self, joint: usize, parameter: Parameter) -> Option<usize> {
         (0..self.base.rank()).find(|&base| self.base.independent(base) == Some((joint, parameter)))

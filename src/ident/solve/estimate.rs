@@ -6,6 +6,9 @@
 //! Cov   = (sum_i R_i' R_i / s_i^2)^-1
 //! ```
 //!
+//! A constant torque that is known to be zero within w ([`RowModel::known_to_be_zero`]) adds (p / w)^2 to J.
+//! The sequential plan does not use it.
+//!
 //! Filtered rows overlap, so the naive standard deviation is too small. With a flat passband each row carries
 //! the information of `m sum h^2` independent ones (m the decimation; exact while that is at most one). The
 //! residual variance is unbiased with the same count: `n` rows lose `k / (m sum h^2)` to `k` parameters.
@@ -231,6 +234,8 @@ pub struct Problem<'a, T: Real, const N: usize, const B: usize> {
     owner: [usize; B],
     /// Base parameters that are not held at zero.
     free: [bool; B],
+    /// One over the standard deviation by which a base parameter is known to be zero; zero where unknown.
+    known: [T; B],
     rank: usize,
 }
 
@@ -243,7 +248,11 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
         }
         let rank = model.base.rank();
         let free = core::array::from_fn(|base| base < rank && !record.selection.dropped[base]);
-        Self { record, noise: noise(record), owner, free, rank }
+        let mut known = [T::zero(); B];
+        for (base, within) in model.known_to_be_zero() {
+            known[base] = T::one() / within;
+        }
+        Self { record, noise: noise(record), owner, free, known, rank }
     }
 
     /// Standard deviation of one independent row of each joint, N m.
@@ -256,6 +265,11 @@ impl<'a, T: Real, const N: usize, const B: usize> Problem<'a, T, N, B> {
         let mut all = Factor::new();
         for (factor, &sigma) in self.record.factors.iter().zip(&self.noise) {
             all.merge_scaled(factor, T::one() / sigma);
+        }
+        for (base, &weight) in self.known.iter().enumerate().filter(|(_, weight)| **weight > T::zero()) {
+            let mut row = [T::zero(); B];
+            row[base] = weight;
+            all.absorb(&row, T::zero());
         }
         if self.record.selection.dropped_count() > 0 {
             all = all.without(&self.record.selection.dropped);

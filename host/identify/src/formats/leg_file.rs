@@ -26,6 +26,7 @@
 //! | `current_offset_a`, `current_step_a` | error and conversion step of the current sensor | 0, 0 (none) |
 //! | `outliers` | `{ percent, torque_nm }`: share of samples with an outlier, its largest error | none |
 //! | `offset`, `rotor` | `"auto"`, `"on"`, `"off"`: estimate torque offset, rotor inertia | on, on |
+//! | `offset` | or `{ within_nm = 0.2 }`: estimate it, known to be zero within this sigma | |
 //! | `stribeck_model` | `"auto"`, `"on"`, `"off"`: estimate Stribeck friction | auto |
 //! | `asymmetric_coulomb` | `"auto"`, `"on"`, `"off"`: one Coulomb level per direction | off |
 //! | `spring`, `load_friction` | the same: spring beside the drive, friction by load; `replay` only | auto |

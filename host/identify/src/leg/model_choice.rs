@@ -5,7 +5,7 @@ use scarab::ident::{Choice, Constant, DriveChoice};
 use crate::formats::leg_file::{JointFile, Switch};
 
 /// Model requested for one joint by the leg file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TermSwitches {
     pub(crate) rotor: Switch,
     pub(crate) offset: Switch,
@@ -28,7 +28,7 @@ impl TermSwitches {
 fn choice(switch: Switch) -> Choice {
     match switch {
         Switch::Auto => Choice::Auto,
-        Switch::On => Choice::On,
+        Switch::On | Switch::Within(_) => Choice::On,
         Switch::Off => Choice::Off,
     }
 }
@@ -40,7 +40,11 @@ pub(crate) fn drive_choice(joint: &JointFile) -> DriveChoice {
         (Switch::Off, Switch::Auto) => (Choice::Auto, Constant::Asymmetry),
         (offset, _) => (choice(offset), Constant::Offset),
     };
-    DriveChoice { rotor: choice(joint.rotor), constant, meaning }
+    let within_nm = match joint.offset {
+        Switch::Within(within) => Some(within as f32),
+        _ => None,
+    };
+    DriveChoice { rotor: choice(joint.rotor), constant, meaning, within_nm }
 }
 
 /// Choice for a joint's Stribeck friction.

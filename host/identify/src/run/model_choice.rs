@@ -94,6 +94,9 @@ impl<const N: usize, const B: usize> Background<N, B> {
         match requested {
             Switch::Off => return decided(false, "disabled by the leg file"),
             Switch::On => return decided(true, "requested by the leg file"),
+            Switch::Within(within) => {
+                return decided(true, &format!("known to be zero within {within} N m by the leg file"));
+            }
             Switch::Auto => {}
         }
         let base = match self.model.base.standing(joint, parameter) {

@@ -25,9 +25,24 @@ pub(super) enum Accept {
     Near(Values),
     /// The parameters are those of the undamaged recording, or the reported direction (name, joint, value)
     /// covers the damage.
-    Clean { clean: Arc<Outcome>, injected: Vec<(String, Option<usize>, f64)> },
-    /// The parameters are right, or the model's torque is.
-    Torque(Box<Sample>),
+    Clean { clean: Arc<Outcome>, injected: Vec<Injected> },
+    /// The parameters are right, or the model's torque is, or a reported direction covers the fault.
+    Torque { sample: Box<Sample>, injected: Vec<Injected> },
+}
+
+/// Direction along which a recording was damaged, its joint if it must be that, and the size in SI units.
+pub(super) type Injected = (String, Option<usize>, f64);
+
+/// Whether the reported sigma of this direction covers the damage: the report says that it would not show.
+fn covers(outcome: &Outcome, (name, joint, size): &Injected) -> bool {
+    let directions = outcome.found.directions.iter().filter(|found| found.name == *name);
+    let mut own = directions.filter(|found| joint.is_none_or(|joint| found.joint == Some(joint)));
+    let to_si = |unit: &str| match unit {
+        "ms" => 1e-3,
+        "%" => 0.01,
+        _ => 1.0,
+    };
+    own.any(|found| found.sigma.is_some_and(|sigma| size.abs() < 3.0 * sigma * to_si(&found.unit)))
 }
 
 /// What a case demands.
@@ -159,7 +174,10 @@ impl Accept {
         match self {
             Self::Never => Some("accepted, must be refused".into()),
             Self::Near(truth) => outcome.errors(truth).first().copied().and_then(beyond),
-            Self::Torque(sample) => {
+            Self::Torque { injected, .. } if injected.iter().any(|injected| covers(outcome, injected)) => {
+                None
+            }
+            Self::Torque { sample, .. } => {
                 let worst = outcome.errors(&sample.truth).first().copied().and_then(beyond)?;
                 let share = sample.torque_error(&outcome.found.base_parameters);
                 (share > ACCEPTED_SHARE).then(|| format!("{worst}, torque {:.1} % wrong", 100.0 * share))
@@ -167,20 +185,8 @@ impl Accept {
             Self::Clean { clean, injected } => {
                 let (shift, name) =
                     largest_shift(&clean.found.base_parameters, &outcome.found.base_parameters);
-                let covers = |(name, joint, size): &(String, Option<usize>, f64)| {
-                    let directions = outcome.found.directions.iter().filter(|found| found.name == *name);
-                    let mut own =
-                        directions.filter(|found| joint.is_none_or(|joint| found.joint == Some(joint)));
-                    let to_si = |unit: &str| match unit {
-                        "ms" => 1e-3,
-                        "%" => 0.01,
-                        _ => 1.0,
-                    };
-                    own.any(|found| {
-                        found.sigma.is_some_and(|sigma| size.abs() < 3.0 * sigma * to_si(&found.unit))
-                    })
-                };
-                let is_covered = !injected.is_empty() && injected.iter().all(covers);
+                let is_covered =
+                    !injected.is_empty() && injected.iter().all(|injected| covers(outcome, injected));
                 (shift > HARMLESS_SIGMAS && !is_covered)
                     .then(|| format!("accepted, {name} {shift:.1} sigma from the clean fit"))
             }

@@ -333,8 +333,10 @@ fn faulty(row: &Kind, seed: u64) -> Result<Trial, ToolError> {
     let mut sample = Sample::new(seed, row.least_joints, row.parallel)?;
     sample.inject(&row.kind, &row.sizes, seed);
     let (task, note, joint) = (sample.task(), sample.fault.clone(), sample.joint);
-    let accept = Accept::Torque(Box::new(sample));
-    let expect = Expect { accept, refuses: true, ..row.expect(joint) };
+    let due = row.expect(joint);
+    let injected = due.causes.iter().map(|cause| (cause.clone(), due.joint, sample.size)).collect();
+    let accept = Accept::Torque { sample: Box::new(sample), injected };
+    let expect = Expect { accept, refuses: true, ..due };
     Ok(Trial { task, expect, note })
 }
 

@@ -29,6 +29,8 @@ pub(super) struct Sample {
     pub(super) fault: String,
     /// Faulted joint, from 1.
     pub(super) joint: Option<usize>,
+    /// Size of the fault, SI units or share.
+    pub(super) size: f64,
     /// Leg as recorded, and as the leg file states it.
     leg: LegFile,
     stated: LegFile,
@@ -79,7 +81,7 @@ impl Sample {
         let percent = 100.0 * noise;
         let fault =
             format!("{joints} joints{axes}, {prior}, {rate_hz} Hz, {duration_s:.0} s, noise {percent:.1} %");
-        Ok(Self { truth, fault, joint: None, stated: leg.clone(), leg, states, torques, recorded })
+        Ok(Self { truth, fault, joint: None, size: 0.0, stated: leg.clone(), leg, states, torques, recorded })
     }
 
     /// What the leg file states, and what is recorded.
@@ -213,6 +215,7 @@ impl Sample {
             _ => {}
         }
         self.joint = Some(joint + 1);
+        self.size = if ["spring", "offset_drift"].contains(&kind) { size * rms } else { size };
         self.fault += &format!("; {kind} {size:.4}, joint {}", joint + 1);
     }
 }

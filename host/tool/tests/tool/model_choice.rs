@@ -7,7 +7,7 @@ use scarab_identify::report::model_choice::ModelChoiceReport;
 use scarab_rig::identify::identify_many;
 use scarab_rig::options::SimulationOptions;
 
-use crate::command::{Folder, assert_contains, base, list, scarab};
+use crate::command::{Folder, MUJOCO, assert_contains, base, list, scarab};
 use serde_json::Value;
 
 fn runs(leg: &LegFile, seeds: std::ops::RangeInclusive<u64>) -> Vec<RunReport> {
@@ -155,6 +155,33 @@ fn one_column_cannot_be_requested_twice() {
         folder
             .scarab("identify --leg @leg.toml")
             .refuses(&format!("unknown variant `{word}`, expected one of `auto`, `on`, `off`"));
+    }
+}
+
+#[test]
+fn an_offset_known_within_a_tolerance_is_estimated_with_what_is_known() {
+    let folder = Folder::new();
+    let text = include_str!("../../../legs/mujoco-leg.toml");
+    let sigma = |offset: &str, name: &str| {
+        folder.write("leg.toml", text.replace("{ within_nm = 0.02 }", offset));
+        let (_, report) = folder.reported(&format!("replay {MUJOCO} --leg @leg.toml --split 0.67"), 0);
+        base(&report, name, "sigma")
+    };
+    let [on, within] =
+        ["\"on\"", "{ within_nm = 0.1 }"].map(|offset| [sigma(offset, "OFF1"), sigma(offset, "HY1")]);
+    // Both kinds of knowledge add up.
+    let expected = 1.0 / (1.0 / on[0]).hypot(1.0 / 0.1);
+    assert!((within[0] / expected - 1.0).abs() < 0.1, "{within:?}, {on:?}");
+    // The weight across the leg resembles an offset.
+    assert!(within[1] < 0.6 * on[1], "{within:?}, {on:?}");
+    for (offset, words) in [
+        ("{ within_nm = 0 }", "within_nm"),
+        ("{ within = 0.1 }", "leg.toml:16"),
+        ("0.1", "leg.toml:16"),
+        ("\"on\"\nrotor = { within_nm = 0.1 }", "`within_nm` belongs to `offset`"),
+    ] {
+        folder.write("leg.toml", text.replacen("{ within_nm = 0.02 }", offset, 1));
+        folder.scarab(&format!("replay {MUJOCO} --leg @leg.toml")).refuses(words);
     }
 }
 

@@ -27,8 +27,8 @@ fn a_rotor_inertia_that_is_negative_beyond_noise_is_kept_and_refused() {
     assert!(builder.verdict().has(Reason::Unphysical));
 }
 
-/// Verdict on a right record after a search with these settings, the search's excess in it, and the tries that
-/// ended too early.
+/// Verdict on a right record after a search with these settings, the search's excess in it, and the tries
+/// that ended too early.
 fn judged(settings: BsoSettings<f32>) -> (Verdict, f32, u32) {
     let model = model::<f32>(Choice::On, &[]);
     let record = record(&model, &leg(0.1, [0.5; 2]), 1);

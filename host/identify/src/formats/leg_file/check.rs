@@ -204,7 +204,21 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
         location.within("percent", outliers.percent, 0.0, 100.0)?;
         location.positive("torque_nm", outliers.torque_nm, 1000.0)?;
     }
-    if (joint.offset, joint.asymmetric_coulomb) == (Switch::On, Switch::On) {
+    if let Switch::Within(within) = joint.offset {
+        inside("offset").positive("within_nm", within, LARGEST_TORQUE)?;
+    }
+    let words = [
+        ("rotor", joint.rotor),
+        ("stribeck_model", joint.stribeck_model),
+        ("asymmetric_coulomb", joint.asymmetric_coulomb),
+        ("spring", joint.spring),
+        ("load_friction", joint.load_friction),
+    ];
+    if let Some((key, _)) = words.into_iter().find(|(_, switch)| matches!(switch, Switch::Within(_))) {
+        return Err(location.fault(key, "is `auto`, `on` or `off`; `within_nm` belongs to `offset`"));
+    }
+    let is_fixed = matches!(joint.offset, Switch::On | Switch::Within(_));
+    if is_fixed && joint.asymmetric_coulomb == Switch::On {
         let complaint = "is on and so is `offset`: while the joint moves a torque offset and a difference of Coulomb \
                          friction between the directions are the same column; one of them must be off";
         return Err(location.fault("asymmetric_coulomb", complaint));

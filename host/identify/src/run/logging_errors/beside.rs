@@ -50,7 +50,7 @@ pub(crate) fn beside(equations: &Equations, torque: Vec<f64>, further: &[Vec<f64
         }),
     );
     let active: Vec<bool> = equations.active.iter().copied().chain(further.iter().map(|_| true)).collect();
-    let fit = solve(&columns, &torque, &equations.weight, &active);
+    let fit = solve(&columns, &torque, &equations.weight, &active, &equations.known);
     let scatter = segment_sigma(&fit, &columns, &torque, &equations.weight, &equations.clusters());
     // The weights are those of the misfit without the columns.
     let plain = equations.fit(&equations.columns, &torque, false).cost;

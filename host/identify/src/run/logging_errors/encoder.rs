@@ -189,7 +189,7 @@ impl Encoders {
                 .iter()
                 .map(|source| if source.training { 1.0 / equations.row_sigma[source.joint] } else { 0.0 })
                 .collect();
-            let values = solve(&again.columns, &again.torque, &weight, &again.active).values;
+            let values = solve(&again.columns, &again.torque, &weight, &again.active, &again.known).values;
             Ok(Some((again, values)))
         };
         let Some((smooth, before)) = refit(None)? else { return Ok(None) };

@@ -1,7 +1,7 @@
 //! Weighted least squares over filtered rows, and a further column beside the parameters.
 //!
 //! ```text
-//! A = sum w^2 x' x,   p = A^-1 sum w^2 x' y,   r = y - x p
+//! A = sum w^2 x' x + K,   p = A^-1 sum w^2 x' y,   r = y - x p     K: known columns, one over variance
 //! u = z - x A^-1 sum w^2 x' z,   S = sum w^2 u^2,   delta = sum w^2 u r / S
 //! sigma_noise = 1 / sqrt S
 //! sigma_segments^2 = c(G) sum_g (sum_(k in g) w^2 u r1)^2 / S^2,   r1 = r - u delta
@@ -92,8 +92,9 @@ fn inverse(matrix: &Table, active: &[bool]) -> (Table, usize) {
     (result, rank)
 }
 
-/// Solves in closed form.
-pub(crate) fn solve(columns: &Table, torque: &[f64], weight: &[f64], active: &[bool]) -> Fit {
+/// Solves in closed form. `known` is one over the variance by which a column is known to be zero; missing
+/// ones are unknown.
+pub(crate) fn solve(columns: &Table, torque: &[f64], weight: &[f64], active: &[bool], known: &[f64]) -> Fit {
     let mut normal = Table::zeros(active.len(), active.len());
     let mut right = vec![0.0; active.len()];
     for ((row, torque), weight) in columns.rows().zip(torque).zip(weight) {
@@ -108,6 +109,9 @@ pub(crate) fn solve(columns: &Table, torque: &[f64], weight: &[f64], active: &[b
                 *slot += scaled * other;
             }
         }
+    }
+    for (column, known) in known.iter().enumerate() {
+        normal[column][column] += known;
     }
     let (inverse, rank) = inverse(&normal, active);
     let values = inverse.times(&right);

@@ -110,10 +110,10 @@ impl<'a> Refused<'a> {
 
     /// Misfit of the nearest leg in which no parameter that must be positive is negative.
     fn positive(&self) -> Vec<f64> {
-        let Equations { columns, torque, weight, active, .. } = &self.errors.equations;
+        let Equations { columns, torque, weight, active, known, .. } = &self.errors.equations;
         let mut active = active.clone();
         loop {
-            let fit = solve(columns, torque, weight, &active);
+            let fit = solve(columns, torque, weight, &active, known);
             let is_negative =
                 |base: &usize| active[*base] && fit.values[*base] < 0.0 && self.question.is_bounded(*base);
             let negative: Vec<usize> = (0..active.len()).filter(is_negative).collect();

@@ -59,6 +59,8 @@ pub(crate) trait Regressor: Send + Sync {
     fn rank(&self) -> usize;
     /// Joint and kind of the parameter that carries a base parameter.
     fn carrier(&self, base: usize) -> Option<(usize, Parameter)>;
+    /// One over the variance by which each base parameter is known to be zero; zero where unknown.
+    fn known(&self) -> Vec<f64>;
     /// Rows of all joints at one instant.
     fn rows(&self, instant: &Instant) -> Table;
     /// Low-passed rows of a motion, whose instants are changed before.
@@ -89,6 +91,14 @@ impl<const N: usize, const B: usize> Regressor for RowModel<f64, N, B> {
 
     fn carrier(&self, base: usize) -> Option<(usize, Parameter)> {
         self.base.independent(base)
+    }
+
+    fn known(&self) -> Vec<f64> {
+        let mut known = vec![0.0; self.rank()];
+        for (base, within) in self.known_to_be_zero() {
+            known[base] = 1.0 / (within * within);
+        }
+        known
     }
 
     fn rows(&self, instant: &Instant) -> Table {

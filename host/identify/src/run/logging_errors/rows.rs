@@ -172,6 +172,8 @@ pub(crate) struct Equations {
     pub(crate) regressor: Arc<dyn Regressor>,
     /// Columns that are estimated.
     pub(crate) active: Vec<bool>,
+    /// One over the variance by which each is known to be zero; zero where unknown.
+    pub(crate) known: Vec<f64>,
     /// Origin of each equation.
     pub(crate) sources: Vec<RowSource>,
     /// Regressor columns.
@@ -200,6 +202,7 @@ impl Equations {
             filters,
             regressor: regressor.clone(),
             active: active.to_vec(),
+            known: regressor.known(),
             sources: Vec::new(),
             columns: Table::new(regressor.rank()),
             torque: Vec::new(),
@@ -420,9 +423,9 @@ impl Equations {
     /// Least squares with these columns and torques, all equations or those of the training motion.
     pub(crate) fn fit(&self, columns: &Table, torque: &[f64], training_only: bool) -> Fit {
         if !training_only {
-            return solve(columns, torque, &self.weight, &self.active);
+            return solve(columns, torque, &self.weight, &self.active, &self.known);
         }
-        solve(columns, torque, &self.training_weight(), &self.active)
+        solve(columns, torque, &self.training_weight(), &self.active, &self.known)
     }
 
     /// Copy in which every equation has the weight of its joint.
@@ -452,7 +455,7 @@ impl Equations {
                 .zip(&trust)
                 .map(|(source, trust): (&RowSource, &f64)| trust.sqrt() / self.row_sigma[source.joint])
                 .collect();
-            let fit = solve(&self.columns, &self.torque, &self.weight, &self.active);
+            let fit = solve(&self.columns, &self.torque, &self.weight, &self.active, &self.known);
             let residual = fit.residuals(&self.columns, &self.torque);
             for joint in 0..self.joints() {
                 self.trust(joint, &residual, round < 5, &mut trust);

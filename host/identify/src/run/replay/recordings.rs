@@ -27,7 +27,7 @@ pub(super) fn leave_one_out(equations: &Equations, file_of: &[usize]) -> (usize,
             .zip(&weight)
             .map(|(file, weight)| if Some(*file) == left_out { 0.0 } else { *weight })
             .collect();
-        solve(&equations.columns, &equations.torque, &rest, &equations.active)
+        solve(&equations.columns, &equations.torque, &rest, &equations.active, &equations.known)
     };
     let rank = without(None).rank;
     let fits: Vec<_> = files.iter().map(|&file| without(Some(file))).collect();

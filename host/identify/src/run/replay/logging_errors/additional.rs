@@ -86,7 +86,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             self.additional.torques.iter().any(|torque| torque.joint == joint + 1 && torque.kind == kind)
         };
         let is_wanted = |&(joint, kind): &(usize, AdditionalKind)| match self.switch(joint, kind) {
-            Switch::On => true,
+            Switch::On | Switch::Within(_) => true,
             Switch::Auto => is_subtracted(joint, kind) || is_cause(joint, kind),
             Switch::Off => false,
         };
