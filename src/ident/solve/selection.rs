@@ -27,7 +27,8 @@
 //! multiplications; at most `2 N + 1` steps.
 //! Limits: a dropped value counts as exactly zero afterwards. The other parameters' sigma lose the part that
 //! resembled it, although up to three of its standard deviations may be real. Where the truth is neither zero
-//! nor clearly visible, the others are biased by that part, and their sigma does not show it.
+//! nor clearly visible, the others are biased by that part, and their sigma does not show it (a replay on the
+//! host adds the shift).
 
 use super::estimate::Problem;
 use crate::ident::record::choice::Choice;

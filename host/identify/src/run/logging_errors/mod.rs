@@ -106,12 +106,6 @@ impl Question {
         self.anatomy.iter().map(|joint| joint.zero_offset()).collect()
     }
 
-    /// Equations of every column, whatever the data chose; `None` with too few rows.
-    pub(crate) fn equations_of_all_columns(&self) -> Option<Equations> {
-        let all = Self { active: vec![true; self.active.len()], ..self.clone() };
-        all.equations(&all.motions).ok().flatten()
-    }
-
     /// This input with every column and without Stribeck friction; `None` if nothing changes.
     pub(crate) fn with_all_columns(&self) -> Option<Self> {
         let without_stribeck = self.regressor.without_stribeck();
@@ -209,7 +203,7 @@ pub(crate) struct Sigma {
     pub(crate) segments: f64,
     /// Part caused by the scatter between recordings; zero where unknown.
     pub(crate) recordings: f64,
-    /// Part caused by directions that are not significant.
+    /// Part caused by directions that are not significant, and by columns that were dropped.
     pub(crate) logging: f64,
     /// Part caused by the steps of the encoders.
     pub(crate) encoder: f64,
@@ -284,8 +278,13 @@ impl LoggingErrors {
         }
         let load = assumption::load_friction(question, &equations);
         let plain = equations.fit(&equations.columns, &equations.torque, false).values;
-        for (sigma, (with, without)) in sigma.iter_mut().zip(load.values.iter().zip(plain)) {
+        for (sigma, (with, without)) in sigma.iter_mut().zip(load.values.iter().zip(&plain)) {
             sigma.logging = sigma.logging.hypot((with - without) * certain(load.significance).sqrt());
+        }
+        let all = equations.with_all_columns();
+        let with = all.fit(&all.columns, &all.torque, false).values;
+        for (base, sigma) in sigma.iter_mut().enumerate().filter(|(base, _)| equations.active[*base]) {
+            sigma.logging = sigma.logging.hypot(with[base] - plain[base]);
         }
         let midway = midway::find(&equations);
         let weight = weight(&equations);

@@ -428,6 +428,11 @@ impl Equations {
         solve(columns, torque, &self.training_weight(), &self.active, &self.known)
     }
 
+    /// Copy in which every column is estimated, whatever the data chose.
+    pub(crate) fn with_all_columns(&self) -> Self {
+        Self { active: vec![true; self.active.len()], ..self.clone() }
+    }
+
     /// Copy in which every equation has the weight of its joint.
     pub(crate) fn with_equal_weights(&self) -> Self {
         let weight = self.sources.iter().map(|source| 1.0 / self.row_sigma[source.joint]).collect();

@@ -432,7 +432,7 @@ fn a_spring_and_friction_by_load_are_fitted_together_with_what_they_cost() {
     });
     let wanted =
         [(0, AdditionalKind::Spring), (0, AdditionalKind::LoadFriction), (1, AdditionalKind::Spring)];
-    let equations = question.equations_of_all_columns().expect("enough rows");
+    let equations = errors(&question).equations;
     let beside = beside::additional(&question, &equations, &wanted);
     for ((value, sigma), truth) in beside.found.iter().zip([15.0, 0.1, 0.0]) {
         assert!((value - truth).abs() < 4.0 * sigma + 0.02 * truth, "{value} +- {sigma}, not {truth}");
@@ -448,6 +448,23 @@ fn a_spring_and_friction_by_load_are_fitted_together_with_what_they_cost() {
     let weight = (0..truth.len()).find(|&base| question.regressor.carrier(base) == Some((0, Parameter::HX)));
     let weight = weight.expect("a moment of joint 1");
     assert!(beside.widths[weight] > 3.0 * plain.inverse[weight][weight].sqrt());
+}
+
+#[test]
+fn sigma_contains_what_a_dropped_column_would_change() {
+    let mut dropped = with_torques(|_, _, torques| torques[0] += 0.5);
+    let truth = dropped.prior.clone().expect("a prior");
+    let carriers: Vec<_> = (0..truth.len()).map(|base| dropped.regressor.carrier(base)).collect();
+    let base_of = |parameter| carriers.iter().position(|carrier| *carrier == Some((0, parameter)));
+    let [offset, moment] =
+        [Parameter::OFF, Parameter::HY].map(|parameter| base_of(parameter).expect("a base"));
+    dropped.active[offset] = false;
+    let found = errors(&dropped);
+    let all = &found.equations;
+    let error = (all.fit(&all.columns, &all.torque, true).values[moment] - truth[moment]).abs();
+    let sigma = found.sigma[moment];
+    assert!(error > 4.0 * sigma.noise.max(sigma.segments), "{error}: {sigma:?}");
+    assert!(error < 3.0 * sigma.total(), "{error}: {sigma:?}");
 }
 
 /// Adds to the torque of the first joint, from the share of the recording and the undamaged torques and

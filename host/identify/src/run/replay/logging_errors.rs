@@ -242,7 +242,8 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         if let (ACCEPTED_WITH_MISFIT, Some(errors)) = (run.verdict, &mut errors) {
             self.explain_misfit(run, &question, errors);
         }
-        Ok(Examined { warning, additional: self.wanted(run, &question).or(refined) })
+        let wanted = errors.as_ref().and_then(|errors| self.wanted(run, &question, errors));
+        Ok(Examined { warning, additional: wanted.or(refined) })
     }
 
     /// Names what explains the misfit of an accepted leg, and adds its effect on the parameters to sigma.

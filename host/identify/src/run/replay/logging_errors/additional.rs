@@ -50,7 +50,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         if wanted.is_empty() {
             return None;
         }
-        let rest = additional(question, &question.equations_of_all_columns()?, &wanted);
+        let rest = additional(question, &errors.equations.with_all_columns(), &wanted);
         for (sigma, width) in errors.sigma.iter_mut().zip(&rest.widths) {
             sigma.logging = sigma.logging.hypot(*width);
         }
@@ -75,7 +75,12 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
     }
 
     /// All additional torques that are to be subtracted, if that is more than is.
-    pub(super) fn wanted(&self, run: &RunReport, question: &Question) -> Option<Additional> {
+    pub(super) fn wanted(
+        &self,
+        run: &RunReport,
+        question: &Question,
+        errors: &LoggingErrors,
+    ) -> Option<Additional> {
         let cause = run.doubt.as_ref().and_then(|doubt| doubt.likely_cause.as_ref());
         let cause = cause.filter(|cause| cause.possible.is_empty());
         let is_cause = |joint: usize, kind: AdditionalKind| {
@@ -95,7 +100,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         if wanted.len() == self.additional.torques.len() {
             return None;
         }
-        let beside = additional(question, &question.equations_of_all_columns()?, &wanted);
+        let beside = additional(question, &errors.equations.with_all_columns(), &wanted);
         let torques = wanted.into_iter().zip(&beside.found).filter_map(|((joint, kind), &(rest, sigma))| {
             let before =
                 run.additional_torque.iter().find(|torque| torque.joint == joint + 1 && torque.kind == kind);
