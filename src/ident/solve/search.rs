@@ -25,7 +25,7 @@ const SMALLEST_GAIN: f64 = 1e-3;
 /// one parameter.
 pub(crate) const LARGEST_EXCESS: f64 = 0.25;
 /// Searches from other seeds until one ends below [`LARGEST_EXCESS`].
-const TRIES: u32 = 3;
+const TRIES: u32 = 8;
 /// Distance of the seeds of two tries.
 const NEXT_TRY: u64 = 0x9e37_79b9_7f4a_7c15;
 

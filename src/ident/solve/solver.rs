@@ -155,7 +155,7 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         if !self.completion.is_done() {
             return SearchState::Running;
         }
-        self.close(model);
+        self.close(model, &model.base.project(&self.completion.parameters()));
         state
     }
 
@@ -180,15 +180,20 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         Some(if self.is_inside() { self.search.excess() } else { T::zero() })
     }
 
+    /// Takes a consistent leg that was found elsewhere, with its base values, as the result.
+    pub fn replace(&mut self, model: &RowModel<T, N, B>, parameters: &LegParameters<T, N>, values: &[T; B]) {
+        self.completion.replace(parameters);
+        self.close(model, values);
+    }
+
     #[inline(never)]
-    fn close(&mut self, model: &RowModel<T, N, B>) {
-        let projected = model.base.project(&self.completion.parameters());
+    fn close(&mut self, model: &RowModel<T, N, B>, projected: &[T; B]) {
         let mut values = self.search.values();
         for ((value, projected), &determined) in
             values.iter_mut().zip(projected).zip(&self.least_squares.determined)
         {
             if determined {
-                *value = projected;
+                *value = *projected;
             }
         }
         let whole = Problem::new(&self.record, model).whole();

@@ -146,6 +146,12 @@ impl<T: Real, const N: usize> Completion<T, N> {
         self.phase = Phase::Stepping;
     }
 
+    /// Takes these parameters of a consistent leg as the result; [`Self::start`] came before.
+    pub(crate) fn replace(&mut self, parameters: &LegParameters<T, N>) {
+        self.point = self.cost.scaled_point(parameters);
+        self.phase = Phase::Done;
+    }
+
     /// Takes one Newton step; returns true when finished.
     pub fn step(&mut self) -> bool {
         if self.phase != Phase::Stepping {

@@ -10,6 +10,7 @@ use super::screening::Continuity;
 use crate::leg::background::Background;
 use crate::report::Source;
 use crate::run::analysis::Search;
+use crate::run::consistent;
 
 /// Result of the search over the training part.
 pub(super) struct Solved<const N: usize, const B: usize> {
@@ -62,6 +63,7 @@ pub(super) fn solve<const N: usize, const B: usize>(
         solver.widen(moved.least_squares());
     }
     let search = background.search(&mut solver);
+    consistent::finish(background, &mut solver);
     background.device.stribeck = solver.stribeck(&background.device);
     recorder.clear(Ends::Whole);
     if options.estimator == Estimator::Robust {
