@@ -100,7 +100,7 @@ impl<T: Real, const N: usize, const B: usize> RowModel<T, N, B> {
     /// Base parameters that are known to be zero, each with its standard deviation, N m.
     pub fn known_to_be_zero(&self) -> impl Iterator<Item = (usize, T)> + '_ {
         self.drive_choice.iter().enumerate().filter_map(|(joint, choice)| {
-            let within = T::from_double(f64::from(choice.within_nm?));
+            let within = T::from_double(f64::from(choice.within_nm.filter(|within| *within > 0.0)?));
             Some((self.drive(joint, Parameter::OFF)?, within))
         })
     }

@@ -1,8 +1,8 @@
 //! Torque of a joint that the rigid-body model lacks: a spring, and friction that grows with the load.
 //!
 //! ```text
-//! torque = T + c sign(qd) |T| + F,   T = L + k q
-//! L = (torque - F) / (1 + c sign(qd (torque - F))) - k q
+//! torque = L + c sign(qd) |L| + k q + F
+//! L = (torque - k q - F) / (1 + c sign(qd (torque - k q - F)))
 //! ```
 //!
 //! L is the torque of the bodies, gravity and rotor, which the gear transmits; F the friction and offset of
@@ -16,6 +16,8 @@ use crate::report::additional_torque::{AdditionalKind, AdditionalTorque};
 
 /// Time before and after a sample over which its speed is measured, s.
 const REACH_S: f64 = 0.05;
+/// Largest friction by load that is subtracted: at one nothing is left of a load that drives the gear.
+const LARGEST_SHARE: f64 = 0.9;
 
 /// Stiffness, N m/rad, and friction by load of a joint, from 0.
 fn of_joint(torques: &[AdditionalTorque], joint: usize) -> [f64; 2] {
@@ -36,7 +38,7 @@ pub(crate) fn added(
 ) -> ([f64; 2], f64) {
     let [stiffness, friction] = of_joint(torques, joint);
     let spring = stiffness * angle_rad;
-    let load = (load_nm + spring).abs();
+    let load = load_nm.abs();
     let variance = torques.iter().filter(|torque| torque.joint == joint + 1).map(|torque| {
         let slope = match torque.kind {
             AdditionalKind::Spring => angle_rad,
@@ -57,23 +59,29 @@ pub(crate) struct Additional {
 }
 
 impl Additional {
+    /// Joints with a spring, from 0.
+    pub(crate) fn springs(&self) -> impl Iterator<Item = usize> + '_ {
+        let springs = self.torques.iter().filter(|torque| torque.kind == AdditionalKind::Spring);
+        springs.map(|torque| torque.joint - 1)
+    }
+
     /// Subtracts the torques from those of a recording.
     pub(crate) fn subtract(&self, recording: &mut Recording) {
-        let step_s = recording.median_step_s();
-        let reach = (REACH_S / step_s).round().max(1.0) as usize;
+        let reach = (REACH_S / recording.median_step_s()).round().max(1.0) as usize;
+        let time_s = &recording.time_s;
         for (joint, series) in recording.joints.iter_mut().enumerate() {
             let [stiffness, share] = of_joint(&self.torques, joint);
+            let share = share.clamp(-LARGEST_SHARE, LARGEST_SHARE);
             let [coulomb, viscous, offset] = self.friction.get(joint).copied().unwrap_or_default();
             let JointSeries { position_rad, torque_nm } = series;
             let last = position_rad.len().saturating_sub(1);
             for (sample, torque) in torque_nm.iter_mut().enumerate() {
                 let (before, after) = (sample.saturating_sub(reach), (sample + reach).min(last));
-                let speed = (position_rad[after] - position_rad[before])
-                    / (step_s * after.saturating_sub(before).max(1) as f64);
+                let passed_s = (time_s[after] - time_s[before]).max(f64::MIN_POSITIVE);
+                let speed = (position_rad[after] - position_rad[before]) / passed_s;
                 let friction = coulomb * sign(speed) + viscous * speed + offset;
-                let transmitted = *torque - friction;
-                *torque = transmitted / (1.0 + share * sign(speed * transmitted)) + friction
-                    - stiffness * position_rad[sample];
+                let loaded = *torque - stiffness * position_rad[sample] - friction;
+                *torque = loaded / (1.0 + share * sign(speed * loaded)) + friction;
             }
         }
     }

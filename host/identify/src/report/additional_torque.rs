@@ -44,7 +44,12 @@ impl AdditionalTorque {
     pub fn words(&self) -> String {
         let Self { value, sigma, .. } = self;
         match self.kind {
-            AdditionalKind::Spring => format!("{value:.3} +- {sigma:.3} N m/rad"),
+            AdditionalKind::Spring => {
+                format!(
+                    "{value:.2} +- {sigma:.2} N m/rad; its torque at angle zero is {}",
+                    rest_name(self.joint - 1)
+                )
+            }
             AdditionalKind::LoadFriction => {
                 format!("{:.2} +- {:.2} % of the load", 100.0 * value, 100.0 * sigma)
             }

@@ -15,7 +15,7 @@ pub struct ModelChoiceReport {
     /// `rotor`, `offset`, `stribeck`, `asymmetric_coulomb`, `spring` or `load_friction`, as in leg files.
     #[serde(deserialize_with = "word")]
     pub option: Word,
-    /// `auto`, `on` or `off`.
+    /// `auto`, `on`, `off` or `within`, known within a tolerance.
     #[serde(deserialize_with = "word")]
     pub asked: Word,
     /// `on` or `off`.
@@ -30,9 +30,14 @@ pub struct ModelChoiceReport {
 }
 
 impl ModelChoiceReport {
+    /// Whether it is a spring or friction by load.
+    fn is_addition(&self) -> bool {
+        AdditionalKind::ALL.map(AdditionalKind::name).contains(&self.option)
+    }
+
     /// Whether it is a spring or friction by load that the leg file demands.
     pub(crate) fn is_demanded_addition(&self) -> bool {
-        self.asked == "on" && AdditionalKind::ALL.map(AdditionalKind::name).contains(&self.option)
+        self.asked == "on" && self.is_addition()
     }
 }
 
@@ -51,11 +56,14 @@ pub struct DirectionsReport {
     pub backward_sigma_nm: Number,
 }
 
-/// One line for each decision that was left to the data.
+/// One line for each decision that was left to the data, and each spring or friction by load.
 pub fn lines(choices: &[ModelChoiceReport], directions: &[DirectionsReport]) -> Vec<String> {
-    let open = choices.iter().filter(|choice| choice.asked == "auto");
+    let open = choices.iter().filter(|choice| choice.asked == "auto" || choice.is_addition());
     let open = open.map(|choice| {
-        format!("model, joint {}: {} {} (auto): {}", choice.joint, choice.option, choice.used, choice.why)
+        format!(
+            "model, joint {}: {} {} ({}): {}",
+            choice.joint, choice.option, choice.used, choice.asked, choice.why
+        )
     });
     let directions = directions.iter().map(|found| {
         format!(

@@ -61,10 +61,10 @@ pub(crate) fn finish<const N: usize, const B: usize>(
     let effort = Effort::device(background.prior.is_some());
     let (parameters, weighted) = completed(background, solver, effort);
     let optimum = weighted.excess(&background.model.base.project(&parameters));
-    if excess(solver).is_some_and(|excess| excess > near(optimum)) {
+    let single = parameters.map(|joint| joint.map(|value| value as f32));
+    if excess(solver).is_some_and(|excess| excess > near(optimum)) && Limits::consistent(&single) {
         let values = background.model.base.project(&parameters).map(|value| value as f32);
-        let parameters = parameters.map(|joint| joint.map(|value| value as f32));
-        solver.replace(&background.device, &parameters, &values);
+        solver.replace(&background.device, &single, &values);
     }
 }
 

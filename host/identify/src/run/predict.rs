@@ -7,7 +7,8 @@
 //!
 //! Only identified values are used: the base set, not its split among grouped parameters. The prior
 //! therefore has no influence on the torque. The band is that of the parameters; noise, stiction
-//! and unmodelled effects come on top.
+//! and unmodelled effects come on top. Springs and friction by load count as independent of the parameters:
+//! with a spring that the motion hardly shows, the band is much too wide.
 //!
 //! | | columns |
 //! | --- | --- |

@@ -250,6 +250,13 @@ fn identified<const N: usize, const B: usize>(
     let encoders = encoders(&parts.wholes, leg);
     encoders.describe(leg, options.bandwidth_hz, &mut background.model);
     encoders.describe(leg, options.bandwidth_hz, &mut background.device);
+    // What is known of an offset is not known of its sum with a spring's torque at rest.
+    for joint in additional.springs() {
+        for choice in [&mut background.model.drive_choice[joint], &mut background.device.drive_choice[joint]]
+        {
+            choice.within_nm = None;
+        }
+    }
     let noise = [&parts.training, &parts.held_out].map(|part| noise_density::<N>(part, options.bandwidth_hz));
     let [training, held_out] = [&parts.training, &parts.held_out].map(|part| {
         let samples = part.iter().map(|file| Samples::new(file, &anatomy, options, &parts.screening));

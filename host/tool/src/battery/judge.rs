@@ -33,7 +33,7 @@ pub(super) enum Accept {
 /// Direction along which a recording was damaged, its joint if it must be that, and the size in SI units.
 pub(super) type Injected = (String, Option<usize>, f64);
 
-/// Whether the reported sigma of this direction covers the damage: the report says that it would not show.
+/// Whether the damage is within three reported sigma of this direction, so that it would not show.
 fn covers(outcome: &Outcome, (name, joint, size): &Injected) -> bool {
     let directions = outcome.found.directions.iter().filter(|found| found.name == *name);
     let mut own = directions.filter(|found| joint.is_none_or(|joint| found.joint == Some(joint)));

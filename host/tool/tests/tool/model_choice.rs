@@ -177,6 +177,10 @@ fn an_offset_known_within_a_tolerance_is_estimated_with_what_is_known() {
     for (offset, words) in [
         ("{ within_nm = 0 }", "within_nm"),
         ("{ within = 0.1 }", "leg.toml:16"),
+        (
+            "\"off\"\nspring = \"on\"",
+            "joint `hip`: `spring` is on, and its torque at rest is measured in a sum",
+        ),
         ("0.1", "leg.toml:16"),
         ("\"on\"\nrotor = { within_nm = 0.1 }", "`within_nm` belongs to `offset`"),
     ] {

@@ -29,6 +29,8 @@ pub(crate) const SMALLEST_RANGE_DEG: f64 = 2.0;
 pub(crate) const LARGEST_SPEED: f64 = 2800.0;
 /// Largest torque limit, N m.
 pub(crate) const LARGEST_TORQUE: f64 = 1000.0;
+/// Smallest sigma of an offset about zero, N m: no torque sensor resolves less.
+const SMALLEST_WITHIN: f64 = 1e-6;
 /// Largest simulated noise of the torque, percent; leg files state at most 100.
 pub const LARGEST_NOISE_PERCENT: f64 = 1000.0;
 /// Largest current limit, A.
@@ -205,7 +207,13 @@ fn joint(number: usize, joint: &JointFile) -> Result<(), Fault> {
         location.positive("torque_nm", outliers.torque_nm, 1000.0)?;
     }
     if let Switch::Within(within) = joint.offset {
-        inside("offset").positive("within_nm", within, LARGEST_TORQUE)?;
+        inside("offset").within("within_nm", within, SMALLEST_WITHIN, LARGEST_TORQUE)?;
+    }
+    let has_offset = joint.offset != Switch::Off && joint.asymmetric_coulomb != Switch::On;
+    if joint.spring == Switch::On && !has_offset {
+        let complaint = "is on, and its torque at rest is measured in a sum with the offset: `offset` must not be off, nor \
+                         `asymmetric_coulomb` on";
+        return Err(location.fault("spring", complaint));
     }
     let words = [
         ("rotor", joint.rotor),

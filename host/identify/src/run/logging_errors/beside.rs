@@ -71,7 +71,8 @@ pub(crate) fn beside(equations: &Equations, torque: Vec<f64>, further: &[Vec<f64
     Beside { refitted, found, widths }
 }
 
-/// Fits springs and frictions by load of joints (from 0) beside the parameters.
+/// Fits springs and frictions by load of joints (from 0) beside the parameters. What is known of an offset is
+/// not known of its sum with a spring's torque at rest.
 pub(crate) fn additional(
     question: &Question,
     equations: &Equations,
@@ -79,6 +80,15 @@ pub(crate) fn additional(
 ) -> Beside {
     let zero = question.zero();
     let rank = equations.active.len();
+    let mut equations = equations.clone();
+    for (base, known) in equations.known.iter_mut().enumerate() {
+        let carrier = equations.regressor.carrier(base);
+        let has_spring = |(joint, kind): &(usize, AdditionalKind)| {
+            *kind == AdditionalKind::Spring && carrier == Some((*joint, Parameter::OFF))
+        };
+        *known *= if wanted.iter().any(has_spring) { 0.0 } else { 1.0 };
+    }
+    let equations = &equations;
     let mut values = equations.fit(&equations.columns, &equations.torque, false).values;
     values.resize(rank + wanted.len(), 0.0);
     let mut fits = LOAD_FITS;
@@ -93,17 +103,11 @@ pub(crate) fn additional(
             equations.torques_of(&|instant| {
                 let rows = equations.regressor.rows(instant);
                 for (joint, row) in rows.rows().enumerate() {
-                    let angle = instant.position[joint] - zero[joint];
-                    let stiffness: f64 = wanted
-                        .iter()
-                        .zip(&values[rank..])
-                        .filter(|(wanted, _)| **wanted == (joint, AdditionalKind::Spring))
-                        .map(|(_, value)| value)
-                        .sum();
-                    let load = dot(row, &transmitted) + stiffness * angle;
                     instant.torque[joint] = match kind {
-                        AdditionalKind::Spring => angle,
-                        AdditionalKind::LoadFriction => sign(instant.velocity[joint]) * load.abs(),
+                        AdditionalKind::Spring => instant.position[joint] - zero[joint],
+                        AdditionalKind::LoadFriction => {
+                            sign(instant.velocity[joint]) * dot(row, &transmitted).abs()
+                        }
                     };
                 }
             })

@@ -106,13 +106,14 @@ impl Question {
         self.anatomy.iter().map(|joint| joint.zero_offset()).collect()
     }
 
-    /// This input with every column and without Stribeck friction; `None` if nothing changes.
+    /// This input with every column, without Stribeck friction and without knowledge of offsets; `None` if
+    /// nothing changes.
     pub(crate) fn with_all_columns(&self) -> Option<Self> {
-        let without_stribeck = self.regressor.without_stribeck();
-        if without_stribeck.is_none() && self.active.iter().all(|on| *on) {
+        let without_knowledge = self.regressor.without_knowledge();
+        if without_knowledge.is_none() && self.active.iter().all(|on| *on) {
             return None;
         }
-        let regressor = without_stribeck.unwrap_or_else(|| self.regressor.clone());
+        let regressor = without_knowledge.unwrap_or_else(|| self.regressor.clone());
         Some(Self { active: vec![true; regressor.rank()], regressor, ..self.clone() })
     }
 

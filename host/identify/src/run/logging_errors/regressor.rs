@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use scarab::ident::record::recorder::STILL_SPEED;
 use scarab::ident::{
-    Ends, FilteredRows, LARGEST_STILL_SHARE, LowPass, RowFilter, RowModel, Smoothed, no_stribeck,
+    DriveChoice, Ends, FilteredRows, LARGEST_STILL_SHARE, LowPass, RowFilter, RowModel, Smoothed, no_stribeck,
 };
 use scarab::model::Parameter;
 
@@ -76,8 +76,8 @@ pub(crate) trait Regressor: Send + Sync {
     fn with_length(&self, joint: usize, factor: f64) -> Option<Arc<dyn Regressor>>;
     /// Regressor for rows of this share of its bandwidth.
     fn with_bandwidth(&self, share: f64) -> Arc<dyn Regressor>;
-    /// Regressor without Stribeck friction; `None` if it has none.
-    fn without_stribeck(&self) -> Option<Arc<dyn Regressor>>;
+    /// Regressor without Stribeck friction and without knowledge of offsets; `None` if it has none.
+    fn without_knowledge(&self) -> Option<Arc<dyn Regressor>>;
 }
 
 impl<const N: usize, const B: usize> Regressor for RowModel<f64, N, B> {
@@ -142,8 +142,11 @@ impl<const N: usize, const B: usize> Regressor for RowModel<f64, N, B> {
         Arc::new(Self { still_speed, pulse: self.pulse.map(|pulse| share * pulse), ..self.clone() })
     }
 
-    fn without_stribeck(&self) -> Option<Arc<dyn Regressor>> {
+    fn without_knowledge(&self) -> Option<Arc<dyn Regressor>> {
         let has_stribeck = self.stribeck.iter().any(|curve| curve.excess != 0.0);
-        has_stribeck.then(|| Arc::new(Self { stribeck: no_stribeck(), ..self.clone() }) as Arc<dyn Regressor>)
+        let has_known = self.known_to_be_zero().next().is_some();
+        let drive_choice = self.drive_choice.map(|choice| DriveChoice { within_nm: None, ..choice });
+        let without = || Self { stribeck: no_stribeck(), drive_choice, ..self.clone() };
+        (has_stribeck || has_known).then(|| Arc::new(without()) as Arc<dyn Regressor>)
     }
 }

@@ -433,6 +433,11 @@ impl Equations {
         Self { active: vec![true; self.active.len()], ..self.clone() }
     }
 
+    /// [`Self::with_all_columns`] of the training motion.
+    pub(crate) fn for_training(&self) -> Self {
+        Self { weight: self.training_weight(), ..self.with_all_columns() }
+    }
+
     /// Copy in which every equation has the weight of its joint.
     pub(crate) fn with_equal_weights(&self) -> Self {
         let weight = self.sources.iter().map(|source| 1.0 / self.row_sigma[source.joint]).collect();

@@ -31,7 +31,7 @@ pub(crate) fn model(run: &RunReport, leg: &LegFile) -> Markup {
         section {
             h2 { "What the model includes" }
             p { "The leg file rules a term in or out, or leaves it to the data: then it is used if it explains at least as many \
-                chi-square units as the limit." }
+                chi-square units as the limit; a spring or friction by load, if the misfit names it." }
             (terms.to_html())
             @for found in &run.stribeck {
                 p { "Stribeck friction of the " (joint_name(leg, found.joint)) ": static friction exceeds Coulomb friction by "
@@ -65,6 +65,7 @@ fn asked(choice: &str) -> &str {
     match choice {
         "auto" => "by the data",
         "on" => "always",
+        "within" => "always, known within a tolerance",
         "off" => "never",
         other => other,
     }

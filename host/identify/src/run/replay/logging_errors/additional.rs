@@ -6,7 +6,8 @@
 //! | `"auto"` | if it is the likely cause of a misfit, and not distinguished from another is none |
 //! | `"off"` | never |
 //!
-//! The recordings are identified again without them, until the values stay within a fifth of their sigma.
+//! The recordings are identified again without them, until the values stay within a fifth of their sigma, at
+//! most four times. A spring needs an offset, with which its torque at rest is measured in a sum.
 
 use scarab::model::Parameter;
 use scarab_base::names::parameter_name;
@@ -50,7 +51,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         if wanted.is_empty() {
             return None;
         }
-        let rest = additional(question, &errors.equations.with_all_columns(), &wanted);
+        let rest = additional(question, &errors.equations.for_training(), &wanted);
         for (sigma, width) in errors.sigma.iter_mut().zip(&rest.widths) {
             sigma.logging = sigma.logging.hypot(*width);
         }
@@ -92,7 +93,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         };
         let is_wanted = |&(joint, kind): &(usize, AdditionalKind)| match self.switch(joint, kind) {
             Switch::On | Switch::Within(_) => true,
-            Switch::Auto => is_subtracted(joint, kind) || is_cause(joint, kind),
+            Switch::Auto => is_subtracted(joint, kind) || is_cause(joint, kind) && self.has_room(joint, kind),
             Switch::Off => false,
         };
         let all = (0..N).flat_map(|joint| AdditionalKind::ALL.map(|kind| (joint, kind)));
@@ -100,7 +101,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         if wanted.len() == self.additional.torques.len() {
             return None;
         }
-        let beside = additional(question, &errors.equations.with_all_columns(), &wanted);
+        let beside = additional(question, &errors.equations.for_training(), &wanted);
         let torques = wanted.into_iter().zip(&beside.found).filter_map(|((joint, kind), &(rest, sigma))| {
             let before =
                 run.additional_torque.iter().find(|torque| torque.joint == joint + 1 && torque.kind == kind);
@@ -112,6 +113,14 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         let torques: Vec<AdditionalTorque> = torques.collect();
         let is_more = torques.len() > self.additional.torques.len();
         is_more.then(|| Additional { torques, friction: self.friction(question, &beside) })
+    }
+
+    /// Whether the joint has the offset with which a spring's torque at rest is measured in a sum.
+    fn has_room(&self, joint: usize, kind: AdditionalKind) -> bool {
+        let has_offset = self.leg.joints.get(joint).is_some_and(|joint| {
+            joint.offset != Switch::Off && !matches!(joint.asymmetric_coulomb, Switch::On)
+        });
+        kind != AdditionalKind::Spring || has_offset
     }
 
     /// Springs that could replace weight unseen, by more than the accepted error.
