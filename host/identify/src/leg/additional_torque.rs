@@ -27,28 +27,6 @@ fn of_joint(torques: &[AdditionalTorque], joint: usize) -> [f64; 2] {
     })
 }
 
-/// Torques of the spring and of the friction by load of a joint (from 0) at an anatomical angle, and their
-/// common standard deviation.
-pub(crate) fn added(
-    torques: &[AdditionalTorque],
-    joint: usize,
-    load_nm: f64,
-    angle_rad: f64,
-    speed_rad_s: f64,
-) -> ([f64; 2], f64) {
-    let [stiffness, friction] = of_joint(torques, joint);
-    let spring = stiffness * angle_rad;
-    let load = load_nm.abs();
-    let variance = torques.iter().filter(|torque| torque.joint == joint + 1).map(|torque| {
-        let slope = match torque.kind {
-            AdditionalKind::Spring => angle_rad,
-            AdditionalKind::LoadFriction => load * sign(speed_rad_s),
-        };
-        (slope * torque.sigma).powi(2)
-    });
-    ([spring, friction * sign(speed_rad_s) * load], variance.sum::<f64>().sqrt())
-}
-
 /// Additional torques of all joints, with the friction that is not transmitted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Additional {
@@ -94,13 +72,14 @@ mod tests {
     #[test]
     fn a_subtracted_torque_is_the_one_that_was_added() {
         let torques = [(AdditionalKind::Spring, 7.0), (AdditionalKind::LoadFriction, 0.12)]
-            .map(|(kind, value)| AdditionalTorque { joint: 1, kind, value, sigma: 0.0 });
+            .map(|(kind, value)| AdditionalTorque { joint: 1, kind, value, sigma: 0.0, shift: Vec::new() });
         let time_s: Vec<f64> = (0..200).map(|sample| 0.01 * f64::from(sample)).collect();
         let position_rad: Vec<f64> = time_s.iter().map(|time| 0.4 + (3.0 * time).sin()).collect();
         let samples = time_s.iter().zip(&position_rad).map(|(time, angle)| {
             let (load, speed) = (20.0 * (2.0 * time).cos(), 3.0 * (3.0 * time).cos());
             let friction = 2.0 * speed.signum() + 0.5 * speed - 0.3;
-            let more: f64 = added(&torques, 0, load, *angle, speed).0.iter().sum();
+            let more: f64 =
+                torques.iter().map(|torque| torque.value * torque.slope(load, *angle, speed)).sum();
             (load + friction, load + friction + more)
         });
         let (model, torque_nm): (Vec<f64>, Vec<f64>) = samples.unzip();

@@ -1,5 +1,6 @@
 //! Springs and friction by load, as data and in words.
 
+use scarab::real::sign;
 use serde::{Deserialize, Serialize};
 
 /// Kind of an additional torque.
@@ -37,9 +38,28 @@ pub struct AdditionalTorque {
     pub value: f64,
     /// Standard deviation of the value.
     pub sigma: f64,
+    /// Change of each base parameter with one standard deviation of the value: their covariance over `sigma`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shift: Vec<f64>,
 }
 
 impl AdditionalTorque {
+    /// Torque for a value of 1, where the bodies, gravity and rotor make this load.
+    pub(crate) fn slope(&self, load_nm: f64, angle_rad: f64, speed_rad_s: f64) -> f64 {
+        match self.kind {
+            AdditionalKind::Spring => angle_rad,
+            AdditionalKind::LoadFriction => sign(speed_rad_s) * load_nm.abs(),
+        }
+    }
+
+    /// Kind and joint in words.
+    pub fn subject(&self) -> String {
+        match self.kind {
+            AdditionalKind::Spring => format!("spring at joint {}", self.joint),
+            AdditionalKind::LoadFriction => format!("friction by load of joint {}", self.joint),
+        }
+    }
+
     /// Value and standard deviation in words.
     pub fn words(&self) -> String {
         let Self { value, sigma, .. } = self;

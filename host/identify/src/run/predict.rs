@@ -5,10 +5,12 @@
 //! sigma_i  = sqrt(y_i' C y_i)        C: covariance of the base parameters
 //! ```
 //!
+//! Springs and friction by load add their slope times their value, and their covariance with the base
+//! parameters.
+//!
 //! Only identified values are used: the base set, not its split among grouped parameters. The prior
 //! therefore has no influence on the torque. The band is that of the parameters; noise, stiction
-//! and unmodelled effects come on top. Springs and friction by load count as independent of the parameters:
-//! with a spring that the motion hardly shows, the band is much too wide.
+//! and unmodelled effects come on top.
 //!
 //! | | columns |
 //! | --- | --- |
@@ -26,13 +28,13 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use scarab::model::{AnatomicalJoint, Chain, JointState, Parameter, regressor};
-use scarab::real::sign;
+use scarab::real::{dot, sign};
 use scarab_base::error::ToolError;
 
 use crate::formats::leg_file::geometry::{anatomy, chain};
 use crate::formats::model_file::ModelFile;
-use crate::leg::additional_torque;
 use crate::leg::states::{Angles, States};
+use crate::report::additional_torque::AdditionalKind;
 
 /// Torque of one joint, N m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -80,13 +82,14 @@ impl<'a, const N: usize> Predictor<'a, N> {
     /// Torques of a state in D-H angles.
     pub fn torques(&self, state: &JointState<f64, N>) -> [Prediction; N] {
         let set = &self.model.base_set;
-        let mut torques = regressor(&self.chain, state, &self.gravity).map(|row| {
-            let columns: Vec<f64> = (self.carriers.iter())
-                .map(|(joint, parameter, moving_only)| {
-                    let moves = if *moving_only { sign(state.qd[*joint]).abs() } else { 1.0 };
-                    moves * row[*joint][parameter.index()]
-                })
-                .collect();
+        let rows = regressor(&self.chain, state, &self.gravity).map(|row| {
+            let columns = self.carriers.iter().map(|(joint, parameter, moving_only)| {
+                let moves = if *moving_only { sign(state.qd[*joint]).abs() } else { 1.0 };
+                moves * row[*joint][parameter.index()]
+            });
+            columns.collect::<Vec<f64>>()
+        });
+        let mut torques = rows.each_ref().map(|columns| {
             let mut torque = Prediction::default();
             for ((element, base), (_, parameter, moving_only)) in
                 columns.iter().zip(&set.parameters).zip(&self.carriers)
@@ -99,14 +102,8 @@ impl<'a, const N: usize> Predictor<'a, N> {
                 };
                 *part += element * base.value;
             }
-            let variance: f64 = set
-                .covariance
-                .iter()
-                .zip(&columns)
-                .map(|(row, left)| {
-                    left * row.iter().zip(&columns).map(|(element, right)| element * right).sum::<f64>()
-                })
-                .sum();
+            let variance: f64 =
+                set.covariance.iter().zip(columns).map(|(row, left)| left * dot(row, columns)).sum();
             torque.sigma = variance.max(0.0).sqrt();
             torque
         });
@@ -123,15 +120,21 @@ impl<'a, const N: usize> Predictor<'a, N> {
                 * found.speed_sigma_rad_s.unwrap_or(0.0);
             torques[joint].sigma = torques[joint].sigma.hypot(surplus).hypot(speed);
         }
-        for (joint, torque) in torques.iter_mut().enumerate() {
+        let loads = torques.each_ref().map(|torque| torque.rigid);
+        for added in &set.additional_torque {
+            let Some(joint) = added.joint.checked_sub(1).filter(|joint| *joint < N) else { continue };
             let anatomy = &self.anatomy[joint];
-            let [load, speed] = [torque.rigid, state.qd[joint]].map(|value| anatomy.from_chain(value));
+            let [load, speed] = [loads[joint], state.qd[joint]].map(|value| anatomy.from_chain(value));
             let angle = anatomy.angle_from_chain(state.q[joint]);
-            let ([spring, friction], sigma) =
-                additional_torque::added(&set.additional_torque, joint, load, angle, speed);
-            torque.rigid += anatomy.to_chain(spring);
-            torque.friction += anatomy.to_chain(friction);
-            torque.sigma = torque.sigma.hypot(sigma);
+            let slope = anatomy.to_chain(added.slope(load, angle, speed));
+            let torque = &mut torques[joint];
+            match added.kind {
+                AdditionalKind::Spring => torque.rigid += slope * added.value,
+                AdditionalKind::LoadFriction => torque.friction += slope * added.value,
+            }
+            let own = slope * added.sigma;
+            let common = dot(&rows[joint], &added.shift);
+            torque.sigma = (torque.sigma.powi(2) + own * (own + 2.0 * common)).max(0.0).sqrt();
         }
         torques
     }

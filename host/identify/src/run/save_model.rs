@@ -60,11 +60,15 @@ impl BaseSet {
             })
             .unzip();
         let row = |row: &usize| kept.iter().map(|&column| detail.covariance[*row][column]).collect();
+        let mut additional_torque = run.additional_torque.clone();
+        for torque in &mut additional_torque {
+            torque.shift = kept.iter().map(|&base| torque.shift[base]).collect();
+        }
         Self {
             covariance: kept.iter().map(row).collect(),
             parameters,
             stribeck: Vec::new(),
-            additional_torque: run.additional_torque.clone(),
+            additional_torque,
         }
     }
 }

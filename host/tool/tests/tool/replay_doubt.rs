@@ -505,7 +505,13 @@ fn a_spring_or_friction_by_load_is_estimated_where_it_explains_the_misfit() {
             "q1,q2,qd1,qd2,qdd1,qdd2\n0.5,0.8,0,0,0,0\n0.6,0.9,0,0,0,0\n0.5,0.8,1e-3,1e-3,0,0\n0.5,0.8,-1e-3,-1e-3,0,0\n",
         );
         folder.scarab("predict --model @model.toml --states @states.csv --out @predicted.csv").ends_with(0);
-        let torque = folder.table("predicted.csv").column(&format!("tau{joint}_Nm"));
+        let predicted = folder.table("predicted.csv");
+        let torque = predicted.column(&format!("tau{joint}_Nm"));
+        if kind == "spring" {
+            // Its error is made good by that of the offset and the weight.
+            let band = predicted.column(&format!("tau{joint}_sigma_Nm"))[0];
+            assert!(band < 0.5 * sigma * 0.8, "{band} N m, stiffness +- {sigma} N m/rad");
+        }
         let change = if kind == "spring" {
             // The shank's posture is the same.
             (torque[1] - torque[0]) / 0.1

@@ -133,6 +133,12 @@ fn base_set(model: &ModelFile) -> Checked {
         if !(torque.value.is_finite() && torque.sigma >= 0.0 && torque.sigma.is_finite()) {
             return Err(fault(&steps, "`value` must be finite, `sigma` 0 or more"));
         }
+        let shift = &torque.shift;
+        if !(shift.is_empty() || shift.len() == set.parameters.len())
+            || shift.iter().any(|change| !change.is_finite())
+        {
+            return Err(fault(&steps, "`shift` must have one finite number for each base parameter"));
+        }
     }
     covariance(set)
 }

@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! torque = Y p + X e            sigma_e: the larger of noise and scatter over segments
-//! widths^2 = sum_e (C_pe / C_ee sigma_e)^2         C: inverse of the normal matrix
+//! shift_e  = C_pe / C_ee sigma_e              C: inverse of the normal matrix
 //! ```
 //!
-//! The widths are what a parameter's standard deviation lacks where X e is taken for known. A spring and
+//! The shifts are what the covariance of the parameters lacks where X e is taken for known. A spring and
 //! friction by load ([`AdditionalTorque`](crate::report::additional_torque::AdditionalTorque)) are such
 //! columns; the second contains the load, which is that of the fit before.
 
@@ -30,8 +30,8 @@ pub(crate) struct Beside {
     pub(crate) refitted: Refitted,
     /// Each further value with its standard deviation.
     pub(crate) found: Vec<(f64, f64)>,
-    /// Standard deviation of each parameter by those of the further values.
-    pub(crate) widths: Vec<f64>,
+    /// Change of each parameter with one standard deviation of each further value.
+    pub(crate) shifts: Vec<Vec<f64>>,
 }
 
 /// A value over its standard deviation.
@@ -58,17 +58,15 @@ pub(crate) fn beside(equations: &Equations, torque: Vec<f64>, further: &[Vec<f64
     let found: Vec<(f64, f64)> = (rank..rank + further.len())
         .map(|at| (fit.values[at], scatter[at].max(remaining * fit.inverse[at][at].max(0.0).sqrt())))
         .collect();
-    let width = |base: usize| {
-        let each = (rank..rank + further.len()).zip(&found);
-        let parts =
-            each.map(|(at, (_, sigma))| fit.inverse[base][at] / fit.inverse[at][at].max(1e-300) * sigma);
-        parts.map(|part| part * part).sum::<f64>().sqrt()
+    let shift = |(at, (_, sigma)): (usize, &(f64, f64))| {
+        let by_sigma = sigma / fit.inverse[at][at].max(1e-300);
+        (0..rank).map(|base| fit.inverse[base][at] * by_sigma).collect()
     };
-    let widths = (0..rank).map(width).collect();
+    let shifts = (rank..).zip(&found).map(shift).collect();
     let significance = found.iter().map(|found| significance(*found)).fold(0.0, f64::max);
     let values = fit.values;
     let refitted = Refitted { cause: CauseReport::default(), values, columns, torque, significance };
-    Beside { refitted, found, widths }
+    Beside { refitted, found, shifts }
 }
 
 /// Fits springs and frictions by load of joints (from 0) beside the parameters. What is known of an offset is

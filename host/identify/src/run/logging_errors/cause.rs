@@ -83,16 +83,19 @@ pub(crate) fn likely(
     if let Some(cause) = refused.is_alien().then(|| per_mille(question)).flatten() {
         return cause;
     }
+    // Where a torque without sign should reverse, friction by load fits part of it.
+    if let Some(cause) = unsigned(question, errors) {
+        return cause;
+    }
     let mut tried: Vec<_> =
         corrections(question).iter().filter_map(|correction| refit(question, correction)).collect();
     tried.extend(fitted(&refused));
     tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
     match named(&refused, &mut tried) {
         Some(best) => best.cause,
-        None => without_weight(findings)
-            .or_else(|| unsigned(question, errors))
-            .or_else(|| excluded(samples))
-            .unwrap_or_else(|| refused.unknown(tried)),
+        None => {
+            without_weight(findings).or_else(|| excluded(samples)).unwrap_or_else(|| refused.unknown(tried))
+        }
     }
 }
 

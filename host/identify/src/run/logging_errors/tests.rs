@@ -5,7 +5,9 @@ use scarab::ident::{LinkPrior, RowModel, Smoothed, prior_parameters};
 use scarab::model::{
     AnatomicalJoint, BaseParameters, Chain, DenavitHartenberg, PARAMETERS_PER_JOINT, Parameter, RigidBody,
 };
+use scarab::real::dot;
 use scarab_base::random::Random;
+use scarab_base::stats::rms;
 
 use crate::report::additional_torque::AdditionalKind;
 use crate::run::logging_errors::*;
@@ -440,14 +442,34 @@ fn a_spring_and_friction_by_load_are_fitted_together_with_what_they_cost() {
     // A spring of joint 1 costs most of the knowledge of its weight.
     let plain = equations.fit(&equations.columns, &equations.torque, false);
     let truth = question.prior.as_ref().expect("a prior");
+    let width = |base: usize| beside.shifts.iter().map(|shift| shift[base] * shift[base]).sum::<f64>().sqrt();
     for (base, truth) in truth.iter().enumerate() {
-        let sigma = plain.inverse[base][base].sqrt().hypot(beside.widths[base]);
+        let sigma = plain.inverse[base][base].sqrt().hypot(width(base));
         let error = beside.refitted.values[base] - truth;
         assert!(error.abs() < 4.0 * sigma + 0.02 * truth.abs(), "{base}: {error} +- {sigma}");
     }
     let weight = (0..truth.len()).find(|&base| question.regressor.carrier(base) == Some((0, Parameter::HX)));
     let weight = weight.expect("a moment of joint 1");
-    assert!(beside.widths[weight] > 3.0 * plain.inverse[weight][weight].sqrt());
+    assert!(width(weight) > 3.0 * plain.inverse[weight][weight].sqrt());
+}
+
+#[test]
+fn only_the_torque_of_the_bodies_counts_as_load() {
+    let with_friction = |share: f64| {
+        let question = with_torques(|_, motion, torques| {
+            let (sign, speed) = (motion.velocity[0].signum(), motion.velocity[0]);
+            let load = torques[0] - 2.0 * sign - speed;
+            torques[0] += 10.0 * sign + share * sign * load.abs();
+        });
+        let equations = errors(&question).equations;
+        let beside = beside::additional(&question, &equations, &[(0, AdditionalKind::LoadFriction)]);
+        let Refitted { values, columns, torque, .. } = beside.refitted;
+        let left = columns.rows().zip(&torque).map(|(row, torque)| torque - dot(row, &values));
+        (beside.found[0].0, rms(left))
+    };
+    let ((none, noise), (found, left)) = (with_friction(0.0), with_friction(0.2));
+    assert!(none.abs() < 0.005 && (found - 0.2).abs() < 0.005, "{none}, {found}");
+    assert!(left < 1.1 * noise, "{left} beside {noise} N m");
 }
 
 #[test]

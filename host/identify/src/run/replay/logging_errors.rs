@@ -242,6 +242,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
         if let (ACCEPTED_WITH_MISFIT, Some(errors)) = (run.verdict, &mut errors) {
             self.explain_misfit(run, &question, errors);
         }
+        additional::correlate(run);
         let wanted = errors.as_ref().and_then(|errors| self.wanted(run, &question, errors));
         Ok(Examined { warning, additional: wanted.or(refined) })
     }

@@ -23,6 +23,9 @@ pub(crate) fn banner(run: &RunReport) -> Markup {
                 p { "The model explains the motion it was identified from" @if validated {
                     ", and predicts the motions that were not used"
                 } ". " (passed(run)) }
+                @for torque in &run.additional_torque {
+                    p { strong { "Identified with a part that the rigid-body model lacks: " } (torque.subject()) ", " (torque.words()) "." }
+                }
                 @if run.is_replay() {
                     @for words in hardly_tested(run) { p { strong { "Hardly tested: " } (words) "." } }
                 }

@@ -52,11 +52,14 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             return None;
         }
         let rest = additional(question, &errors.equations.for_training(), &wanted);
-        for (sigma, width) in errors.sigma.iter_mut().zip(&rest.widths) {
-            sigma.logging = sigma.logging.hypot(*width);
-        }
-        for (torque, (_, sigma)) in run.additional_torque.iter_mut().zip(&rest.found) {
-            torque.sigma = *sigma;
+        let dropped = &self.solver.record().selection.dropped;
+        for ((torque, (_, own)), shift) in run.additional_torque.iter_mut().zip(&rest.found).zip(&rest.shifts)
+        {
+            for (sigma, change) in errors.sigma.iter_mut().zip(shift) {
+                sigma.logging = sigma.logging.hypot(*change);
+            }
+            torque.sigma = *own;
+            torque.shift = self.background.kept(dropped).map(|base| shift[base]).collect();
         }
         run.model_choice.extend(run.additional_torque.iter().map(|torque| ModelChoiceReport {
             joint: torque.joint,
@@ -108,7 +111,7 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             let value = rest + before.map_or(0.0, |before| before.value);
             let is_seen = value > 0.0 && significance((value, sigma)) > LISTED;
             let is_used = before.is_some() || is_seen || self.switch(joint, kind) == Switch::On;
-            is_used.then_some(AdditionalTorque { joint: joint + 1, kind, value, sigma })
+            is_used.then(|| AdditionalTorque { joint: joint + 1, kind, value, sigma, shift: Vec::new() })
         });
         let torques: Vec<AdditionalTorque> = torques.collect();
         let is_more = torques.len() > self.additional.torques.len();
@@ -159,6 +162,22 @@ impl<const N: usize, const B: usize> Subject<'_, N, B> {
             [coulomb, viscous, self.anatomy[joint].from_chain(offset)]
         };
         (0..N).map(of_joint).collect()
+    }
+}
+
+/// Gives the covariance of the base parameters, which has the reported standard deviations, the part that
+/// the additional torques make.
+pub(super) fn correlate(run: &mut RunReport) {
+    let shifts: Vec<&[f64]> = run.additional_torque.iter().map(|torque| &*torque.shift).collect();
+    let common =
+        |row: usize, column: usize| shifts.iter().map(|shift| shift[row] * shift[column]).sum::<f64>();
+    let covariance = &mut run.detail.covariance;
+    let rest = |(base, row): (usize, &Vec<f64>)| (1.0 - common(base, base) / row[base]).max(0.0).sqrt();
+    let rests: Vec<f64> = covariance.iter().enumerate().map(rest).collect();
+    for (row, elements) in covariance.iter_mut().enumerate() {
+        for (column, element) in elements.iter_mut().enumerate() {
+            *element = rests[row] * rests[column] * *element + common(row, column);
+        }
     }
 }
 
