@@ -81,6 +81,7 @@ impl<T: Real, const N: usize, const D: usize> Pso<T, N, D> {
                 individual_learning: self.settings.individual_learning,
                 global_learning: self.settings.global_learning,
                 limit: self.settings.velocity_limit,
+                per_coordinate: true,
             };
             self.particles.steer(particle, &rule, &mut self.random);
             let velocity = &self.particles.velocity[particle];

@@ -2,8 +2,10 @@
 //!
 //! Why one type: the beetle swarm inherits exactly this from the particle swarm, without differences.
 //!
-//! Velocity, per coordinate with fresh random numbers r1, r2 in 0..1 (Eq. 19), limited to the velocity limit:
+//! Velocity with fresh random numbers r1, r2 in 0..1 (Eq. 19), limited to the velocity limit per coordinate:
 //!   v = w v + c1 r1 (P_i - x) + c2 r2 (G - x)
+//! The numbers are drawn for each coordinate, or once for a particle: then the pull points to P_i and G and
+//! does not depend on the axes. In a narrow slanted valley other points are far too high.
 //! Inertia weight (Eq. 20): w = w_max - (w_max - w_min) t / M
 //!
 //! Symbols: x position, v velocity, P_i personal best, G best of the personal bests, all in box coordinates
@@ -55,6 +57,8 @@ pub(super) struct VelocityRule<T> {
     pub(crate) global_learning: T,
     /// Largest speed per coordinate, share of the box.
     pub(crate) limit: T,
+    /// Whether every coordinate has its own random numbers.
+    pub(crate) per_coordinate: bool,
 }
 
 /// N particles in box coordinates.
@@ -124,8 +128,10 @@ impl<T: Real, const N: usize, const D: usize> Particles<T, N, D> {
         let own = live(&self.personal_best[particle], self.dimension);
         let global = live(&self.personal_best[leader], self.dimension);
         let velocity = live_mut(&mut self.velocity[particle], self.dimension);
+        let mut draw = || -> (T, T) { (random.uniform(), random.uniform()) };
+        let common = (!rule.per_coordinate).then(&mut draw);
         for (((speed, &at), &own), &global) in velocity.iter_mut().zip(position).zip(own).zip(global) {
-            let (first, second): (T, T) = (random.uniform(), random.uniform());
+            let (first, second) = common.unwrap_or_else(&mut draw);
             let pull =
                 rule.individual_learning * first * (own - at) + rule.global_learning * second * (global - at);
             *speed = clamp(rule.inertia_weight * *speed + pull, -rule.limit, rule.limit);
@@ -206,8 +212,13 @@ mod tests {
         let mut random = Random::new(5);
         let mut particles = Particles::<f64, 4, 6>::new(3);
         particles.scatter(&mut random);
-        let rule =
-            VelocityRule { inertia_weight: 0.8, individual_learning: 9.0, global_learning: 9.0, limit: 0.2 };
+        let rule = VelocityRule {
+            inertia_weight: 0.8,
+            individual_learning: 9.0,
+            global_learning: 9.0,
+            limit: 0.2,
+            per_coordinate: true,
+        };
         for round in 0..50 {
             for particle in 0..4 {
                 particles.record(particle, f64::from(round * 7 % 5) - particle as f64);

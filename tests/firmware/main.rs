@@ -13,6 +13,7 @@ mod model_reference;
 mod planar_leg;
 mod store;
 mod swarm_document;
+mod swarm_invariance;
 mod swarm_tables;
 #[path = "../../src/testing.rs"]
 mod testing;

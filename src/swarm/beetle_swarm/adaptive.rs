@@ -1,8 +1,8 @@
 //! Rules of the adaptive beetle swarm: whiskers share a frame, learn a metric and retreat from bad moves.
 //!
 //! The main mechanism: the whiskers of the best beetles together make a Newton step in the subspace of their
-//! frame, in a metric they learn. The velocity of Eq. (19) contributes little: without it most medians stay
-//! equal; it shortens the tails. In order of importance:
+//! frame, in a metric they learn. The velocity of Eq. (19), with one pair of random numbers for a beetle,
+//! contributes little: it shortens the way along Rosenbrock's valley. In order of importance:
 //! 1. Shared scent: every beetle steps along all directions of the frame, not only along its own.
 //! 2. Learned metric: measured curvature stretches it; disabled where readings are not convex (ripples).
 //! 3. Retreat: a move to a value worse than the previous one and the personal best is undone.
@@ -22,17 +22,17 @@
 //! P, G, Eq. (19), two whiskers, the weighted move.
 //! Cost: 2 n + min(2 n, N) evaluations per round, which is an iteration where 4 n >= N; `docs/bso.md` counts
 //! the rest. Up to five square roots per direction are the only calls into `libm`.
-//! Known limits: the search exploits fast. Only leaps and restarts search globally: it fails on Rastrigin's
-//! function, rotated in 10 dimensions and unrotated in 30. On a quadratic cost least squares is exact and
+//! Known limits: the search exploits fast. Only leaps and restarts search globally; a leap assumes ripples on
+//! a convex envelope. On a quadratic cost least squares is exact and
 //! instant. A noise of 1e-4 of the cost's value corrupts the last digits: the search is meant for fixed data.
 
-use crate::real::{Real, abs, clamp, dot, max, min};
+use crate::real::{Real, clamp, dot, max, min};
 
 use super::super::particles::{Particles, VelocityRule};
 use super::super::random::Random;
 use super::super::rows::{add_scaled, live, live_mut};
 use super::frame::{Frame, Reach};
-use super::leap::{LEAP_SPREAD, Leap, leap_whisker};
+use super::leap::{Leap, leap_whisker};
 use super::metric::Metric;
 use super::rules::{Opening, Rules, Side};
 use super::settings::{AdaptiveSettings, Part};
@@ -46,8 +46,6 @@ const TRUST_LEVELS: f64 = 1.6;
 const MARGIN: f64 = 0.02;
 /// Moving beetles per beetle with whiskers: a round has as many whisker evaluations as moves.
 const MOVES_PER_READER: usize = 2;
-/// Least relative progress of the best value.
-const PROGRESS: f64 = 1e-7;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
@@ -64,7 +62,7 @@ pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
     pub(super) convex_share: Option<T>,
     /// Rounds since the swarm was scattered, including the current one.
     pub(super) round: u32,
-    pub(super) leap: Leap<T>,
+    pub(super) leap: Leap<T, D>,
     /// Best value that counted as progress, and the rounds since.
     progress: T,
     waited: u32,
@@ -103,7 +101,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     /// bests (such differences point into narrow valleys); the others have none.
     fn proposal(&self, beetle: usize, beetles: &Particles<T, N, D>, random: &mut Random) -> Option<[T; D]> {
         match beetle {
-            _ if self.leap.under_way => Some(self.axis(beetle, beetles.dimension())),
+            _ if self.leap.under_way => None,
             0 if self.has(Part::GradientDirection) => {
                 self.gradient.map(|gradient| self.metric.gradient_to_metric(&gradient))
             }
@@ -139,7 +137,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
 
     /// Trust om_i: beetles alternate between more and less trust.
     fn trust_of(&self, beetle: usize) -> T {
-        if !self.has(Part::TrustAdaptation) || self.leap.under_way {
+        if !self.has(Part::TrustAdaptation) {
             return T::one();
         }
         let levels = T::from_double(TRUST_LEVELS);
@@ -182,14 +180,17 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
             beetles.sort();
         }
         let best = beetles.personal_best_value[beetles.leader().min(N - 1)];
-        if self.progress - best > T::from_double(PROGRESS) * abs(best) {
+        if self.progress - best > self.leap.least_progress(best) {
             self.progress = best;
             self.waited = 0;
         } else {
             self.waited += 1;
-            if self.waited >= self.settings.patience && !self.leaps_from(best) {
-                self.forget();
-                return Opening::Scatter;
+            if self.waited >= self.settings.patience {
+                if !self.leaps_from(best) {
+                    self.forget();
+                    return Opening::Scatter;
+                }
+                self.gather(beetles);
             }
         }
         self.round = self.round.wrapping_add(1);
@@ -232,12 +233,21 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
     fn displace(&mut self, beetle: usize, beetles: &mut Particles<T, N, D>, random: &mut Random) {
         let beetle = beetle.min(N - 1);
         let dimension = beetles.dimension();
+        if self.leap.under_way {
+            if beetle == 0 {
+                self.learn_gradient(dimension);
+                self.aim_leap(&beetles.position[beetle]);
+            }
+            self.leap.to(live_mut(&mut beetles.position[beetle], dimension), random);
+            return;
+        }
         let psi = self.scent(beetle, &beetles.position[beetle], dimension);
         let rule = VelocityRule {
             inertia_weight: self.settings.inertia_weight,
             individual_learning: self.settings.individual_learning,
             global_learning: self.settings.global_learning,
             limit: self.settings.velocity_limit,
+            per_coordinate: false,
         };
         beetles.steer(beetle, &rule, random);
         let share = self.settings.velocity_share;
@@ -245,9 +255,6 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         add_scaled(position, share, live(&beetles.velocity[beetle], dimension));
         add_scaled(position, T::one() - share, live(&psi, dimension));
         for entry in position {
-            if self.leap.under_way {
-                *entry += T::from_double(LEAP_SPREAD) * random.signed::<T>();
-            }
             *entry = clamp(*entry, T::from_double(-MARGIN), T::from_double(1.0 + MARGIN));
         }
     }
@@ -322,7 +329,7 @@ mod tests {
         }
         for beetle in 0..N {
             let position = &beetles.position[beetle];
-            let within_reach = (0..D).all(|index| abs(position[index] - (0.3 + 0.1 * index as f64)) < 0.3);
+            let within_reach = (0..D).all(|index| (position[index] - (0.3 + 0.1 * index as f64)).abs() < 0.3);
             rules.displace(beetle, &mut beetles, &mut random);
             if within_reach {
                 // Parabolas over whiskers of 0.1 leave 1e-16 / 0.01 of rounding.

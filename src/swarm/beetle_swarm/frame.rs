@@ -16,7 +16,7 @@
 //! Cost: per direction two or three products with the metric (2 D^2 each) and 4 D j operations of
 //! Gram-Schmidt, repeated per draw, at most 8 draws; memory N (3 D + 6) scalars.
 
-use crate::real::{Real, abs, clamp, dot, is_finite, min, sign, sqrt};
+use crate::real::{Real, abs, clamp, dot, is_finite, max, min, sign, sqrt};
 
 use super::super::random::Random;
 use super::super::rows::{add_scaled, live, live_mut, scale};
@@ -29,8 +29,8 @@ const DRAWS: u32 = 8;
 const LEAST_REMAINDER: f64 = 1e-2;
 /// Least length of a vector with a direction.
 const LEAST_LENGTH: f64 = 1e-18;
-/// Curvature above minus this share of |f| / l^2 is rounding and counts as convex.
-const CURVATURE_ROUNDING: f64 = 1e-6;
+/// Curvature above minus so many roundings of f over l^2 counts as convex.
+const CURVATURE_ROUNDINGS: f64 = 8.0;
 
 /// Limits of whiskers and steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ pub(super) struct Reach<T> {
     pub(crate) limit: T,
     /// True if a step is the parabola's, where that has a minimum.
     pub(crate) parabola: bool,
-    /// Whisker length in box coordinates, in place of the usual one.
+    /// Length of a whisker along a metric axis, in place of the usual one; others are longer.
     pub(crate) long: Option<T>,
 }
 
@@ -124,13 +124,14 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
         let displacement = metric.to_box(&direction);
         let box_length = sqrt(dot(live(&displacement, self.dimension), live(&displacement, self.dimension)));
         let covector = metric.gradient_to_box(&direction);
+        let largest = live(&direction, self.dimension).iter().fold(T::zero(), |most, &z| max(most, abs(z)));
         let coordinate = dot(live(&covector, self.dimension), live(beetle, self.dimension));
         self.direction[index] = direction;
         self.displacement[index] = displacement;
         self.covector[index] = covector;
         self.whisker[index] = Whisker {
             box_length,
-            length: min(reach.long.map_or(reach.whisker, |long| long / box_length), reach.limit / box_length),
+            length: reach.long.map_or(min(reach.whisker, reach.limit / box_length), |long| long / largest),
             coordinate,
             reading: None,
         };
@@ -203,7 +204,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
             slope,
             curvature,
             step: clamp(step, -longest, longest),
-            convex: curvature > -T::from_double(CURVATURE_ROUNDING) * abs(centre) / square
+            convex: curvature > -T::from_double(CURVATURE_ROUNDINGS) * T::EPSILON * abs(centre) / square
                 || curvature > T::zero(),
         });
     }

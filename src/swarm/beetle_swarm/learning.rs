@@ -5,7 +5,8 @@
 //!   grad  = sum_j g_j w_j, the next frame's first direction
 //!   al_j  = 1 + rate gate (1 / sqrt(h_j / mean h) - 1), over its mean: stretch of A along z_j; gate is 0
 //!           up to 70 % of convex readings and 1 at 100 %, so that ripples have no effect
-//!   l     = 0.7 l + 0.3 sqrt(D) median |s_j|: whiskers as long as the usual step average ripples of its size
+//!   l     = 0.7 l + 0.3 sqrt(D) median |s_j|, at least 0.8 l: whiskers as long as the usual step average
+//!           ripples of its size
 //! Symbols as in adaptive.rs and frame.rs; h_j relative to the mean of the positive ones, limited to 1/4..4.
 //!
 //! Source: own experiments. Cost: 4 D^2 min(N, D) operations, the metric's; two square roots per direction.
@@ -13,7 +14,7 @@
 //! more iterations); rates of 0.85 and 1, curvature limited to 1/9..9 (3 % faster on one function, longer
 //! tails on another).
 
-use crate::real::{Real, abs, clamp, median, sqrt};
+use crate::real::{Real, abs, clamp, max, median, sqrt};
 
 use super::super::rows::{add_scaled, live, live_mut};
 use super::adaptive::AdaptiveRules;
@@ -22,9 +23,12 @@ use super::settings::Part;
 /// Least trust in other beetles' whiskers, and its change per compared pair.
 const LEAST_TRUST: f64 = 0.02;
 const TRUST_CHANGE: f64 = 0.1;
-/// Range of the usual whisker length, metric coordinates. Shorter ones cancel in single precision.
-const SHORTEST_WHISKER: f64 = 3e-4;
+/// Longest usual whisker, metric coordinates. The shortest is the root of the type's rounding: near a value
+/// of 1 a shorter one measures rounding only.
 const LONGEST_WHISKER: f64 = 0.3;
+/// Least ratio of the usual whisker length to that of the round before: the metric of a cost with a sharp
+/// ridge needs time to turn to the ridge.
+const LEAST_WHISKER_CHANGE: f64 = 0.8;
 /// Decay per round without adaptation of the length ([`Part::WhiskerAdaptation`]).
 const WHISKER_DECAY: f64 = 0.95;
 /// Weight of the latest round in whisker length and convex share.
@@ -128,11 +132,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     /// Moves the usual whisker length towards the usual step.
     pub(super) fn learn_whisker(&mut self, dimension: usize) {
         if !self.has(Part::WhiskerAdaptation) {
-            self.whisker = clamp(
-                T::from_double(WHISKER_DECAY) * self.whisker,
-                T::from_double(SHORTEST_WHISKER),
-                T::from_double(LONGEST_WHISKER),
-            );
+            self.whisker = limited(T::from_double(WHISKER_DECAY) * self.whisker);
             return;
         }
         let mut steps = [T::zero(); N];
@@ -148,9 +148,13 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
         let median = median(live_mut(&mut steps, read));
         let root = sqrt(nalgebra::convert::<f32, T>(dimension as f32));
-        let length = smoothed(self.whisker, root * median);
-        self.whisker = clamp(length, T::from_double(SHORTEST_WHISKER), T::from_double(LONGEST_WHISKER));
+        let shortest = T::from_double(LEAST_WHISKER_CHANGE) * self.whisker;
+        self.whisker = limited(max(smoothed(self.whisker, root * median), shortest));
     }
+}
+
+fn limited<T: Real>(whisker: T) -> T {
+    clamp(whisker, sqrt(T::EPSILON), T::from_double(LONGEST_WHISKER))
 }
 
 fn smoothed<T: Real>(before: T, now: T) -> T {

@@ -36,11 +36,15 @@ impl<T: Real, const D: usize> Metric<T, D> {
 
     /// Resets to box coordinates.
     pub fn forget(&mut self) {
-        for matrix in [&mut self.shape, &mut self.inverse] {
-            for (index, row) in matrix.iter_mut().enumerate() {
-                *row = [T::zero(); D];
-                row[index] = T::one();
-            }
+        self.scale(&[T::one(); D]);
+    }
+
+    /// Resets to box coordinates over these positive lengths.
+    pub fn scale(&mut self, lengths: &[T; D]) {
+        let rows = self.shape.iter_mut().zip(&mut self.inverse).zip(lengths);
+        for (index, ((shape, inverse), &length)) in rows.enumerate() {
+            (*shape, *inverse) = ([T::zero(); D], [T::zero(); D]);
+            (shape[index], inverse[index]) = (length, T::one() / length);
         }
     }
 

@@ -79,6 +79,7 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for PaperRules<T, N
             individual_learning: self.settings.individual_learning,
             global_learning: self.settings.global_learning,
             limit: self.settings.velocity_limit,
+            per_coordinate: true,
         };
         beetles.steer(beetle, &rule, random);
         let position = live_mut(&mut beetles.position[beetle], dimension);

@@ -1,0 +1,96 @@
+//! The default beetle swarm on rotated functions whose minimum lies anywhere in the box (results in
+//! `docs/results/bso.md`).
+//!
+//! `cargo run --release --example swarm_rotated -- [runs] [first seed]`
+//!
+//! Double precision, at most 2,000 evaluations per dimension. Every run has its own rotation and minimum. No
+//! test uses these seeds, and no setting was chosen with them.
+
+use std::sync::Mutex;
+use std::thread;
+
+use scarab::swarm::{Bso, BsoSettings, Search, SwarmError};
+
+use crate::functions::{Instance, Shape};
+
+mod functions;
+
+const EVALUATIONS_PER_DIMENSION: u32 = 2_000;
+const FIRST_SEED: u64 = 700_000_001;
+const THREADS: usize = 2;
+
+/// Name, function, whether it is rotated, constant that is added, goal above the minimum, dimensions.
+type Row = (&'static str, Shape, bool, f64, f64, &'static [usize]);
+
+const ROWS: [Row; 11] = [
+    ("ellipsoid", Shape::Ellipsoid, true, 0.0, 1e-6, &[2, 10, 30]),
+    ("ellipsoid + 1000", Shape::Ellipsoid, true, 1e3, 1e-6, &[10]),
+    ("discus", Shape::Discus, true, 0.0, 1e-6, &[10, 30]),
+    ("bent cigar", Shape::BentCigar, true, 0.0, 1e-6, &[2, 10, 30]),
+    ("bent cigar + 1000", Shape::BentCigar, true, 1e3, 1e-6, &[10]),
+    ("sharp ridge", Shape::SharpRidge, true, 0.0, 1e-6, &[2, 10, 20]),
+    ("powers", Shape::Powers, true, 0.0, 1e-6, &[10]),
+    ("Rosenbrock along the box", Shape::Rosenbrock, false, 0.0, 1e-6, &[10, 30]),
+    ("Rastrigin", Shape::Rastrigin, true, 0.0, 0.1, &[2, 10, 20, 30]),
+    ("Rastrigin along the box", Shape::Rastrigin, false, 0.0, 0.1, &[10]),
+    ("Ackley", Shape::Ackley, true, 0.0, 0.1, &[10, 30]),
+];
+
+fn main() -> Result<(), SwarmError> {
+    let mut arguments = std::env::args().skip(1).map(|argument| argument.parse::<u64>().ok());
+    let runs = arguments.next().flatten().unwrap_or(40).max(1);
+    let first_seed = arguments.next().flatten().unwrap_or(FIRST_SEED);
+    println!("{runs} runs from seed {first_seed}\n");
+    println!(
+        "| function, to | D | runs that arrive | evaluations, median | 90 % |\n| --- | --- | --- | --- | --- |"
+    );
+    let cases: Vec<(&Row, usize)> =
+        ROWS.iter().flat_map(|row| row.5.iter().map(move |dimension| (row, *dimension))).collect();
+    let lines = Mutex::new(vec![Ok(String::new()); cases.len()]);
+    let next = Mutex::new(0..cases.len());
+    thread::scope(|scope| {
+        for _ in 0..THREADS {
+            scope.spawn(|| {
+                while let Some(index) = next.lock().ok().and_then(|mut next| next.next()) {
+                    let line = line(cases[index].0, cases[index].1, runs, first_seed);
+                    if let Ok(mut lines) = lines.lock() {
+                        lines[index] = line;
+                    }
+                }
+            });
+        }
+    });
+    for line in lines.into_inner().unwrap_or_default() {
+        println!("{}", line?);
+    }
+    Ok(())
+}
+
+fn line(row: &Row, dimension: usize, runs: u64, first_seed: u64) -> Result<String, SwarmError> {
+    let (name, shape, is_rotated, constant, goal, _) = *row;
+    let mut arrived = Vec::new();
+    for seed in first_seed..first_seed + runs {
+        let cost = Instance { constant, ..Instance::new(shape, dimension, is_rotated, seed) };
+        let mut swarm = Box::new(Bso::<f64, 20, 30>::new(&cost, BsoSettings::default(), seed)?);
+        let most = EVALUATIONS_PER_DIMENSION * dimension as u32;
+        let is_there =
+            |swarm: &Bso<f64, 20, 30>| swarm.best().is_some_and(|best| best.value - constant <= goal);
+        while !is_there(&swarm) && swarm.evaluations() < most {
+            swarm.advance(&cost, 1);
+        }
+        if is_there(&swarm) {
+            arrived.push(swarm.evaluations());
+        }
+    }
+    arrived.sort_unstable();
+    let quantile = |share: f64| {
+        let rank = (share * runs as f64).ceil() as usize;
+        arrived.get(rank.max(1) - 1).map_or_else(|| "-".to_owned(), u32::to_string)
+    };
+    let count = arrived.len();
+    Ok(format!(
+        "| {name}, {goal:e} | {dimension} | {count} of {runs} | {} | {} |",
+        quantile(0.5),
+        quantile(0.9)
+    ))
+}
