@@ -21,14 +21,6 @@ const PATIENCE: u32 = 15;
 /// Smallest progress in chi-square units; a tenth of a standard deviation of one parameter is 0.01.
 const SMALLEST_GAIN: f64 = 1e-3;
 
-/// Largest cost above least squares at which a search may end, chi-square units: half a standard deviation of
-/// one parameter.
-pub(crate) const LARGEST_EXCESS: f64 = 0.25;
-/// Searches from other seeds until one ends below [`LARGEST_EXCESS`].
-const TRIES: u32 = 8;
-/// Distance of the seeds of two tries.
-const NEXT_TRY: u64 = 0x9e37_79b9_7f4a_7c15;
-
 /// Rule that ends a search without progress.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Patience<T> {
@@ -85,8 +77,6 @@ pub struct SwarmSearch<T: Real, const B: usize> {
     plan: Plan,
     pub(super) settings: BsoSettings<T>,
     seed: u64,
-    /// Searches that ended too early.
-    failed: u32,
     bounds: ParameterBox<T, B>,
     stage: Stage<T, B>,
     stage_index: usize,
@@ -117,7 +107,6 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
             plan: plan,
             settings: settings,
             seed: seed,
-            failed: 0,
             bounds: *bounds,
             stage: stage,
             stage_index: 0,
@@ -133,25 +122,11 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
 
     /// Restarts cold, with the columns that remain.
     pub(crate) fn restart<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
-        self.clear(problem);
-        (self.iterations, self.evaluations, self.failed) = (0, 0, 0);
-    }
-
-    /// Searches from another seed if this search ended far above least squares, and a try is left.
-    pub(crate) fn try_again<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) -> bool {
-        let is_stuck = self.excess > T::from_double(LARGEST_EXCESS) && self.failed + 1 < TRIES;
-        if is_stuck {
-            self.failed += 1;
-            self.clear(problem);
-        }
-        is_stuck
-    }
-
-    fn clear<const N: usize>(&mut self, problem: &Problem<'_, T, N, B>) {
         (self.values, self.determined) = ([T::zero(); B], [false; B]);
         self.stage = problem.stage(self.plan, 0, &self.values, &self.determined);
         self.swarm.clear();
-        (self.stage_index, self.state, self.excess) = (0, SearchState::Running, T::zero());
+        (self.stage_index, self.state) = (0, SearchState::Running);
+        (self.iterations, self.evaluations, self.excess) = (0, 0, T::zero());
         self.patience = Patience::NEW;
     }
 
@@ -170,8 +145,7 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
     fn start_stage(&mut self) {
         let cost = StageCost { stage: &self.stage, bounds: &self.bounds };
         // Each stage has its own random numbers.
-        let seed = self.seed.wrapping_add(u64::from(self.failed).wrapping_mul(NEXT_TRY));
-        let seed = seed.wrapping_add(self.stage_index as u64);
+        let seed = self.seed.wrapping_add(self.stage_index as u64);
         match Bso::new(&cost, self.settings, seed) {
             Ok(swarm) => self.swarm.fill(|slot| slot.write(swarm)),
             Err(error) => self.state = SearchState::Failed(error),
@@ -272,12 +246,6 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
     /// Evaluations of all stages.
     pub fn evaluations(&self) -> u32 {
         self.evaluations
-    }
-
-    /// Tries before this one.
-    #[cfg(test)]
-    pub(crate) fn failed(&self) -> u32 {
-        self.failed
     }
 
     /// Seed of the first stage.

@@ -142,9 +142,6 @@ impl<T: Real, const N: usize, const B: usize> Solver<T, N, B> {
         if state != SearchState::Done || self.completed.is_some() {
             return state;
         }
-        if self.completion.is_waiting() && self.is_inside() && self.search.try_again(&problem) {
-            return SearchState::Running;
-        }
         if self.completion.is_waiting() {
             self.completion.start(model, &problem.whole(), &self.search.values(), &self.centre());
         }

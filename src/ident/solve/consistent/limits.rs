@@ -11,10 +11,10 @@
 //! Every line but the first is linear in the 14 parameters. `k` is the prior's radius of gyration about the
 //! centre of mass, at least a tenth of the length. Twice its square is the trace of the inertia over mass.
 //!
-//! Without a prior the limits come from geometry and torque. The centre of mass is within a segment's length
-//! of the joint. The last segment counts as long as the longest known one, 1 m where none is known. Masses
-//! reach up to what ten times the measured torque could need, and ten times as far without a length: a
-//! short body needs more mass for the same moment. Rotor, friction and offset are limited as in the box of
+//! Without a prior the limits come from geometry and torque, and are so wide that only what a body can be
+//! limits it. The centre of mass is within four segments' lengths of the joint. The last segment counts as
+//! long as the longest known one, 1 m where none is known. Masses reach up to a hundred times what the
+//! measured torque could need at a segment's length: a short body needs more mass for the same moment. Rotor, friction and offset are limited as in the box of
 //! the base set ([`crate::ident::solve::bounds`]). A neutral leg replaces the prior: a twentieth of these
 //! limits, centres of mass at the joints. Its standard deviations equal its own size
 //! ([`Limits::deviations`]), so a zero in it carries no information.
@@ -36,8 +36,10 @@ const SHARE: (f64, f64) = (0.2, 5.0);
 const SMALLEST_SHAPE: f64 = 0.1;
 /// Length of a segment where the geometry gives none, m.
 const UNKNOWN_LENGTH_M: f64 = 1.0;
-/// Factor of a mass's limit where no length is known.
-const UNKNOWN_LENGTH_ROOM: f64 = 10.0;
+/// Farthest centre of mass of a leg without a prior, segments' lengths.
+const UNKNOWN_REACH: f64 = 4.0;
+/// Largest mass of a leg without a prior, over what ten times the measured torque could need.
+const UNKNOWN_MASS: f64 = 10.0;
 /// Parameters of a neutral leg over the most that the torque could need.
 const NEUTRAL_SHARE: f64 = 0.05;
 /// Extent of a ball over its radius of gyration, 1 / sqrt(3).
@@ -50,7 +52,7 @@ pub(super) const CONDITIONS: usize = 17;
 pub(super) struct LinkLimits<T> {
     pub(crate) mass: (T, T),
     pub(crate) centre: [T; 3],
-    /// Half the segment's length: largest distance of the centre of mass from `centre`, each coordinate.
+    /// Largest distance of the centre of mass from `centre`, each coordinate.
     pub(crate) reach: T,
     /// Radius of gyration about the centre of mass.
     pub(crate) gyration: T,
@@ -77,11 +79,11 @@ impl<T: Real, const N: usize> Limits<T, N> {
     ) -> Self {
         let measured = measured_box(model, record);
         let neutral = neutral(model, record, &measured.high);
-        let room = if longest(model) > T::zero() { T::one() } else { T::from_double(UNKNOWN_LENGTH_ROOM) };
         let believed = prior.unwrap_or(&neutral);
         let links = core::array::from_fn(|joint| {
             let link = &believed[joint];
             let (low, high) = (T::from_double(SHARE.0), T::from_double(SHARE.1));
+            let reach = if prior.is_some() { 0.5 } else { 0.5 * UNKNOWN_REACH };
             let length = match prior {
                 Some(prior) => segment_length(model, prior, joint),
                 None => T::from_double(2.0) * known_length(model, joint),
@@ -102,10 +104,10 @@ impl<T: Real, const N: usize> Limits<T, N> {
                 mass: if prior.is_some() {
                     (low * link.body.mass, high * link.body.mass)
                 } else {
-                    (T::zero(), room * link.body.mass / T::from_double(NEUTRAL_SHARE))
+                    (T::zero(), T::from_double(UNKNOWN_MASS / NEUTRAL_SHARE) * link.body.mass)
                 },
                 centre: core::array::from_fn(|axis| link.body.centre_of_mass[axis]),
-                reach: T::from_double(0.5) * length,
+                reach: T::from_double(reach) * length,
                 gyration: real::max(shape, T::from_double(SMALLEST_SHAPE) * length),
                 drive: [
                     positive(Parameter::IA, link.rotor_inertia),
