@@ -14,8 +14,9 @@
 //! Without a prior the limits come from geometry and torque, and are so wide that only what a body can be
 //! limits it. The centre of mass is within four segments' lengths of the joint. The last segment counts as
 //! long as the longest known one, 1 m where none is known. Masses reach up to a hundred times what the
-//! measured torque could need at a segment's length: a short body needs more mass for the same moment. Rotor, friction and offset are limited as in the box of
-//! the base set ([`crate::ident::solve::bounds`]). A neutral leg replaces the prior: a twentieth of these
+//! measured torque could need at a segment's length: a short body needs more mass for the same moment.
+//! Rotor, friction and offset are limited as in the box of the base set
+//! ([`crate::ident::solve::bounds`]). A neutral leg replaces the prior: a twentieth of these
 //! limits, centres of mass at the joints. Its standard deviations equal its own size
 //! ([`Limits::deviations`]), so a zero in it carries no information.
 

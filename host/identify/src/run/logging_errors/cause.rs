@@ -16,6 +16,7 @@
 use scarab::ident::Test;
 use scarab_base::stats::rms;
 
+use crate::report::additional_torque::AdditionalKind;
 use crate::report::doubt::{CauseReport, DirectionReport, ReadAs, SampleFinding};
 use crate::report::findings::FindingReport;
 use crate::run::logging_errors::corrections::{
@@ -83,19 +84,20 @@ pub(crate) fn likely(
     if let Some(cause) = refused.is_alien().then(|| per_mille(question)).flatten() {
         return cause;
     }
-    // Where a torque without sign should reverse, friction by load fits part of it.
-    if let Some(cause) = unsigned(question, errors) {
-        return cause;
-    }
     let mut tried: Vec<_> =
         corrections(question).iter().filter_map(|correction| refit(question, correction)).collect();
     tried.extend(fitted(&refused));
     tried.extend(unit_pairs(question).iter().filter_map(|pair| refit(question, pair)));
     match named(&refused, &mut tried) {
-        Some(best) => best.cause,
-        None => {
-            without_weight(findings).or_else(|| excluded(samples)).unwrap_or_else(|| refused.unknown(tried))
+        // Friction by load fits part of a torque without sign.
+        Some(best) if best.cause.name == AdditionalKind::LoadFriction.name() => {
+            unsigned(question, errors).unwrap_or(best.cause)
         }
+        Some(best) => best.cause,
+        None => without_weight(findings)
+            .or_else(|| unsigned(question, errors))
+            .or_else(|| excluded(samples))
+            .unwrap_or_else(|| refused.unknown(tried)),
     }
 }
 
