@@ -17,7 +17,12 @@ pub(crate) const BEETLES: usize = 20;
 /// Most iterations of a stage.
 pub(crate) const LARGEST_ITERATIONS: u32 = 300;
 /// A stage ends when the best cost fell by less than [`SMALLEST_GAIN`] in this many iterations.
-const PATIENCE: u32 = 15;
+pub(super) const PATIENCE: u32 = 15;
+/// Iterations in place of [`PATIENCE`] above [`LARGEST_EXCESS`], where the verdict would refuse the result.
+const LONG_PATIENCE: u32 = 45;
+/// Largest cost above least squares at which a search may end, chi-square units: half a standard deviation of
+/// one parameter.
+pub(crate) const LARGEST_EXCESS: f64 = 0.25;
 /// Smallest progress in chi-square units; a tenth of a standard deviation of one parameter is 0.01.
 const SMALLEST_GAIN: f64 = 1e-3;
 
@@ -32,12 +37,12 @@ impl<T: Real> Patience<T> {
     /// Patience before the first iteration.
     pub(crate) const NEW: Self = Self { value: T::LARGEST, iteration: 0 };
 
-    /// Whether a search ends with this best cost after these iterations.
-    pub(crate) fn ends(&mut self, value: T, iterations: u32) -> bool {
+    /// Whether a search ends with this best cost after these iterations, where so many may bring nothing.
+    pub(crate) fn ends(&mut self, value: T, iterations: u32, patience: u32) -> bool {
         if value < self.value - T::from_double(SMALLEST_GAIN) {
             *self = Self { value, iteration: iterations };
         }
-        iterations >= LARGEST_ITERATIONS || iterations >= self.iteration + PATIENCE
+        iterations >= LARGEST_ITERATIONS || iterations >= self.iteration + patience
     }
 }
 
@@ -176,7 +181,8 @@ impl<T: Real, const B: usize> SwarmSearch<T, B> {
             if iterations > before {
                 self.iterations = self.iterations.saturating_add(1);
                 let value = swarm.best().map_or(T::LARGEST, |best| best.value);
-                if self.patience.ends(value, iterations) {
+                let is_far = value > T::from_double(LARGEST_EXCESS);
+                if self.patience.ends(value, iterations, if is_far { LONG_PATIENCE } else { PATIENCE }) {
                     self.close_stage(problem);
                 }
             }

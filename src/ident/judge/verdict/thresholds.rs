@@ -1,5 +1,6 @@
 //! Acceptance limits of a result.
 
+use crate::ident::solve::search::LARGEST_EXCESS;
 use crate::real::Real;
 
 /// Limits of all tests, each with the reason for its default.
@@ -74,7 +75,7 @@ impl<T: Real> Default for Thresholds<T> {
             smallest_speed: T::from_double(0.05),
             largest_pulse_share: T::from_double(0.2),
             largest_condition: T::from_double(1000.0),
-            search_excess: T::from_double(0.25),
+            search_excess: T::from_double(LARGEST_EXCESS),
             largest_negative_sigmas: T::from_double(3.0),
             largest_excess_spreads: T::from_double(5.0),
             noise_quantile: T::from_double(5.2),

@@ -21,7 +21,7 @@
 
 use super::cost::LegCost;
 use super::limits::Limits;
-use crate::ident::solve::search::{BEETLES, Patience};
+use crate::ident::solve::search::{BEETLES, PATIENCE, Patience};
 use crate::model::{INERTIAL_PARAMETERS, LegParameters, LogCholesky, PARAMETERS_PER_JOINT, Parameter};
 use crate::real::{self, Real};
 use crate::swarm::{Bso, BsoSettings, Objective, Search, SwarmError};
@@ -149,7 +149,7 @@ impl<T: Real, const D: usize> FullSearch<T, D> {
             let iterations = self.swarm.iterations();
             if iterations > before {
                 let value = self.swarm.best().map_or(T::LARGEST, |best| best.value);
-                self.done |= self.patience.ends(value, iterations);
+                self.done |= self.patience.ends(value, iterations, PATIENCE);
             }
         }
         self.done
