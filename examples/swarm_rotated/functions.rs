@@ -16,7 +16,7 @@
 //! ```
 //!
 //! Source: Hansen et al., Real-Parameter Black-Box Optimization Benchmarking 2009: Noiseless Functions
-//! Definitions; without its oscillating transforms.
+//! Definitions; some of its transforms are left out.
 
 use scarab::real::{exp, ln, sqrt};
 use scarab::swarm::{Objective, Random, TestFunction, TestProblem};

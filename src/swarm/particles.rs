@@ -1,6 +1,6 @@
 //! State shared by particle swarm and beetle swarm: positions, velocities, personal bests, and Eq. (19).
 //!
-//! Why one type: the beetle swarm inherits exactly this from the particle swarm, without differences.
+//! Why one type: the beetle swarm inherits this from the particle swarm.
 //!
 //! Velocity with fresh random numbers r1, r2 in 0..1 (Eq. 19), limited to the velocity limit per coordinate:
 //!   v = w v + c1 r1 (P_i - x) + c2 r2 (G - x)
@@ -11,8 +11,8 @@
 //! Symbols: x position, v velocity, P_i personal best, G best of the personal bests, all in box coordinates
 //! (0..1 per coordinate); w inertia weight, c1 and c2 individual and global learning factor; t iteration of
 //! M.
-//! Source: Kennedy, Eberhart (1995); the paper, Eqs (18)-(20). Cost: 8 D operations and 2 D random numbers
-//! per particle; memory N (3 D + 2) scalars.
+//! Source: Kennedy, Eberhart (1995); the paper, Eqs (18)-(20). Cost: 8 D operations and 2 or 2 D random
+//! numbers per particle; memory N (3 D + 2) scalars.
 
 use crate::real::{Real, clamp};
 

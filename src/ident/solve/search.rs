@@ -18,7 +18,8 @@ pub(crate) const BEETLES: usize = 20;
 pub(crate) const LARGEST_ITERATIONS: u32 = 300;
 /// A stage ends when the best cost fell by less than [`SMALLEST_GAIN`] in this many iterations.
 pub(super) const PATIENCE: u32 = 15;
-/// Iterations in place of [`PATIENCE`] above [`LARGEST_EXCESS`], where the verdict would refuse the result.
+/// Iterations in place of [`PATIENCE`] above [`LARGEST_EXCESS`]: the verdict would refuse the result, unless
+/// least squares lies outside the box.
 const LONG_PATIENCE: u32 = 45;
 /// Largest cost above least squares at which a search may end, chi-square units: half a standard deviation of
 /// one parameter.
@@ -37,7 +38,8 @@ impl<T: Real> Patience<T> {
     /// Patience before the first iteration.
     pub(crate) const NEW: Self = Self { value: T::LARGEST, iteration: 0 };
 
-    /// Whether a search ends with this best cost after these iterations, where so many may bring nothing.
+    /// Whether a search ends with this best cost after these iterations; `patience`: iterations without
+    /// progress.
     pub(crate) fn ends(&mut self, value: T, iterations: u32, patience: u32) -> bool {
         if value < self.value - T::from_double(SMALLEST_GAIN) {
             *self = Self { value, iteration: iterations };

@@ -60,7 +60,7 @@ pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
     pub(super) trust: T,
     /// Smoothed share of convex readings; `None` before the first.
     pub(super) convex_share: Option<T>,
-    /// Rounds since the swarm was scattered, including the current one.
+    /// Rounds since the swarm was scattered or landed, including the current one.
     pub(super) round: u32,
     pub(super) leap: Leap<T, D>,
     /// Best value that counted as progress, and the rounds since.

@@ -50,7 +50,8 @@ pub struct AdaptiveSettings<T> {
     pub velocity_limit: T,
     /// lambda of Eq. (29), share of the velocity in a move; default 0.2. With 0.4 the tails get longer.
     pub velocity_share: T,
-    /// Longest whisker and longest step along one direction of the frame; default 0.5.
+    /// Longest whisker and longest step along one direction of the frame, in a leap longest step along a
+    /// coordinate; default 0.5.
     pub step_limit: T,
     /// Directions of the frame (after the gradient's) that join two personal bests; default 12.
     pub pair_directions: usize,

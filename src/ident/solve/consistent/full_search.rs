@@ -8,7 +8,7 @@
 //! alpha        ln(mass) / 2           0.2 .. 5 of the prior's mass
 //! d1 d2 d3     ln(extent)             0.05 .. 1.58 of the prior's radius of gyration k
 //! s12 s23 s13  shear                  +- 1.58 k
-//! t1 t2 t3     centre of mass         the prior's +- half the segment's length
+//! t1 t2 t3     centre of mass         the prior's +- half the segment's length, without a prior +- 4 lengths
 //! IA FC FV     logarithms             0.01 .. 1 of their largest values
 //! OFF          linear
 //! ```
@@ -17,7 +17,7 @@
 //! than single precision resolves.
 //!
 //! Cost: an evaluation 1,200 multiplications and 11 exponentials (two joints). Memory: a `Bso` of 14 N
-//! dimensions, 21.1 kB for two joints.
+//! dimensions, 21.5 kB for two joints.
 
 use super::cost::LegCost;
 use super::limits::Limits;

@@ -4,20 +4,21 @@
 //! pseudo-inertia of every link positive definite
 //! mass              0.2 .. 5 of the prior's
 //! centre of mass    the prior's +- half the segment's length, each coordinate
-//! extent            second moment about the prior's centre <= mass rho^2,  rho^2 = 15 k^2 + 3/4 length^2
+//! extent            second moment about the prior's centre <= mass rho^2,  rho^2 = 15 k^2 + 3 reach^2
 //! rotor, Coulomb, viscous    0 .. 5 of the prior's;    offset +- 5 (|prior| + Coulomb)
 //! ```
 //!
-//! Every line but the first is linear in the 14 parameters. `k` is the prior's radius of gyration about the
-//! centre of mass, at least a tenth of the length. Twice its square is the trace of the inertia over mass.
+//! Every line but the first is linear in the 14 parameters. `reach` is half the segment's length. `k` is
+//! the prior's radius of gyration about the centre of mass, at least a tenth of the length. Twice its
+//! square is the trace of the inertia over mass.
 //!
 //! Without a prior the limits come from geometry and torque, and are so wide that only what a body can be
 //! limits it. The centre of mass is within four segments' lengths of the joint. The last segment counts as
 //! long as the longest known one, 1 m where none is known. Masses reach up to a hundred times what the
 //! measured torque could need at a segment's length: a short body needs more mass for the same moment.
-//! Rotor, friction and offset are limited as in the box of the base set
-//! ([`crate::ident::solve::bounds`]). A neutral leg replaces the prior: a twentieth of these
-//! limits, centres of mass at the joints. Its standard deviations equal its own size
+//! Rotor, friction and offset are limited to a quarter of the box of the base set
+//! ([`crate::ident::solve::bounds`]). A neutral leg replaces the prior, small beside these limits, with its
+//! centres of mass at the joints. Its standard deviations equal its own size
 //! ([`Limits::deviations`]), so a zero in it carries no information.
 
 use crate::ident::record::motion_record::Record;

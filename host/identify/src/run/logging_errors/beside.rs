@@ -7,7 +7,8 @@
 //!
 //! The shifts are what the covariance of the parameters lacks where X e is taken for known. A spring and
 //! friction by load ([`AdditionalTorque`](crate::report::additional_torque::AdditionalTorque)) are such
-//! columns; the second contains the load, which is that of the fit before.
+//! columns; the second contains the load, which is that of the fit before. The values count as independent
+//! of each other.
 
 use scarab::model::Parameter;
 use scarab::real::{dot, sign};

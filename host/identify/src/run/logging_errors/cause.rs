@@ -91,7 +91,8 @@ pub(crate) fn likely(
     match named(&refused, &mut tried) {
         // Friction by load fits part of a torque without sign.
         Some(best) if best.cause.name == AdditionalKind::LoadFriction.name() => {
-            unsigned(question, errors).unwrap_or(best.cause)
+            let magnitude = unsigned(question, errors);
+            magnitude.filter(|found| found.joint == best.cause.joint).unwrap_or(best.cause)
         }
         Some(best) => best.cause,
         None => without_weight(findings)
