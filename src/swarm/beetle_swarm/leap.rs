@@ -109,7 +109,7 @@ pub(super) fn leap_whisker<T: Real>(random: &mut Random) -> T {
 }
 
 impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
-    /// Decides at a standstill with this best value: true for a leap. Otherwise the leaps count anew.
+    /// Decides at a standstill with this best value: true for a leap, else the leaps are forgotten.
     pub(super) fn leaps_from(&mut self, best: T) -> bool {
         let leap = &mut self.leap;
         let is_first = leap.best == T::LARGEST;
@@ -220,7 +220,7 @@ mod tests {
             let leaps = standstills.map(|best| rules.leaps_from(constant + best));
             // 10.0 fails once, 9.0 succeeds, then two failures; the third one ends the leaps.
             assert_eq!(leaps, [true, true, true, true, true, false]);
-            assert!(rules.leaps_from(constant + 9.5), "scattered: leaps count anew");
+            assert!(rules.leaps_from(constant + 9.5), "scattered: counted from zero again");
         }
         let mut never = Rules::new(AdaptiveSettings { leaps: 0, ..settings }, D);
         assert!(!never.leaps_from(10.0));
