@@ -26,7 +26,7 @@
 //! a convex envelope. On a quadratic cost least squares is exact and
 //! instant. A noise of 1e-4 of the cost's value corrupts the last digits: the search is meant for fixed data.
 
-use crate::real::{Real, clamp, dot, max, min};
+use crate::real::{Real, clamp, dot, max, min, sqrt};
 
 use super::super::particles::{Particles, VelocityRule};
 use super::super::random::Random;
@@ -60,6 +60,8 @@ pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
     pub(super) trust: T,
     /// Smoothed share of convex readings; `None` before the first.
     pub(super) convex_share: Option<T>,
+    /// Decrease of the cost that the parabolas predict for the moves of this round.
+    pub(super) predicted: T,
     /// Rounds since the swarm was scattered or landed, including the current one.
     pub(super) round: u32,
     pub(super) leap: Leap<T, D>,
@@ -78,6 +80,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
             whisker: T::from_double(FIRST_WHISKER),
             trust: T::from_double(FIRST_TRUST),
             convex_share: None,
+            predicted: T::zero(),
             leap: Leap::none(),
             round: 0,
             progress: T::LARGEST,
@@ -106,8 +109,8 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
                 self.gradient.map(|gradient| self.metric.gradient_to_metric(&gradient))
             }
             1.. if beetle <= self.settings.pair_directions => {
-                let one = &beetles.personal_best[random.below(N).min(N - 1)];
-                let other = &beetles.personal_best[random.below(N).min(N - 1)];
+                let one = &beetles.personal_best[random.below(self.movers()).min(N - 1)];
+                let other = &beetles.personal_best[random.below(self.movers()).min(N - 1)];
                 let mut difference = *one;
                 let dimension = beetles.dimension();
                 add_scaled(live_mut(&mut difference, dimension), -T::one(), live(other, dimension));
@@ -149,9 +152,9 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         (beetle as u32 ^ self.round) & 1 == 0
     }
 
-    /// Step psi_i, box coordinates.
-    fn scent(&self, beetle: usize, position: &[T; D], dimension: usize) -> [T; D] {
-        let mut psi = [T::zero(); D];
+    /// Step psi_i, box coordinates, and the decrease of the cost that the parabolas predict for it.
+    fn scent(&self, beetle: usize, position: &[T; D], dimension: usize) -> ([T; D], T) {
+        let (mut psi, mut decrease) = ([T::zero(); D], T::zero());
         let trust = self.trust_of(beetle);
         let count = self.frame.count();
         let directions = self.frame.covector.iter().zip(&self.frame.displacement);
@@ -159,18 +162,19 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
             directions.zip(&self.frame.whisker).take(count).enumerate()
         {
             let Some(reading) = whisker.reading else { continue };
-            let step = if index == beetle {
-                reading.step
+            let (offset, step) = if index == beetle {
+                (T::zero(), reading.step)
             } else if !self.has(Part::Sharing) {
                 continue;
             } else {
-                let at = dot(live(covector, dimension), live(position, dimension));
+                let offset = dot(live(covector, dimension), live(position, dimension)) - whisker.coordinate;
                 let longest = self.settings.step_limit / whisker.box_length;
-                clamp(reading.step - (at - whisker.coordinate), -longest, longest) * trust
+                (offset, clamp(reading.step - offset, -longest, longest) * trust)
             };
+            decrease -= step * (reading.slope + reading.curvature * (offset + step * T::from_double(0.5)));
             add_scaled(live_mut(&mut psi, dimension), step, live(displacement, dimension));
         }
-        psi
+        (psi, decrease)
     }
 }
 
@@ -194,6 +198,7 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
             }
         }
         self.round = self.round.wrapping_add(1);
+        self.predicted = T::zero();
         Opening::Search
     }
 
@@ -213,6 +218,9 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         let proposal = self.proposal(beetle, beetles, random);
         let position = &beetles.position[beetle.min(N - 1)];
         self.frame.aim(beetle, proposal, position, &self.metric, reach, random);
+        if let (1.., Some(pair)) = (beetle, proposal) {
+            self.frame.whisker[beetle.min(N - 1)].distance = sqrt(dot(&pair, &pair));
+        }
     }
 
     fn tip(&self, beetle: usize, side: Side, beetles: &Particles<T, N, D>) -> [T; D] {
@@ -241,7 +249,8 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
             self.leap.to(live_mut(&mut beetles.position[beetle], dimension), random);
             return;
         }
-        let psi = self.scent(beetle, &beetles.position[beetle], dimension);
+        let (psi, decrease) = self.scent(beetle, &beetles.position[beetle], dimension);
+        self.predicted += decrease;
         let rule = VelocityRule {
             inertia_weight: self.settings.inertia_weight,
             individual_learning: self.settings.individual_learning,
@@ -266,6 +275,7 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
             return;
         }
         self.learn_trust(&beetles.value, found);
+        let is_kinked = self.is_kinked(&beetles.value, found, dimension);
         for (beetle, &value) in found.iter().enumerate() {
             let worse = value > max(beetles.value[beetle], beetles.personal_best_value[beetle]);
             beetles.record(beetle, value);
@@ -275,7 +285,7 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
         }
         self.learn_gradient(dimension);
         self.learn_metric();
-        self.learn_whisker(dimension);
+        self.learn_whisker(dimension, is_kinked);
     }
 
     /// An iteration takes the rounds that evaluate N times. A leap restarts the count of rounds.

@@ -54,13 +54,22 @@ pub(super) struct Whisker<T> {
     pub(crate) length: T,
     /// Coordinate w_j . x_j.
     pub(crate) coordinate: T,
+    /// Distance of the two personal bests that the direction joins, metric coordinates; negative for
+    /// others.
+    pub(crate) distance: T,
     /// `None` until both whiskers were read, and where a value was not finite.
     pub(crate) reading: Option<Reading<T>>,
 }
 
 impl<T: Real> Whisker<T> {
     fn unaimed() -> Self {
-        Self { box_length: T::one(), length: T::one(), coordinate: T::zero(), reading: None }
+        Self {
+            box_length: T::one(),
+            length: T::one(),
+            coordinate: T::zero(),
+            distance: -T::one(),
+            reading: None,
+        }
     }
 }
 
@@ -133,6 +142,7 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
             box_length,
             length: reach.long.map_or(min(reach.whisker, reach.limit / box_length), |long| long / largest),
             coordinate,
+            distance: -T::one(),
             reading: None,
         };
     }

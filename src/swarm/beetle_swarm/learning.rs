@@ -5,8 +5,10 @@
 //!   grad  = sum_j g_j w_j, the next frame's first direction
 //!   al_j  = 1 + rate gate (1 / sqrt(h_j / mean h) - 1), over its mean: stretch of A along z_j; gate is 0
 //!           up to 70 % of convex readings and 1 at 100 %, so that ripples have no effect
-//!   l     = 0.7 l + 0.3 sqrt(D) median |s_j|, at least 0.8 l: whiskers as long as the usual step average
-//!           ripples of its size
+//!   l     = 0.7 l + 0.3 sqrt(D) median |s_j|: whiskers as long as the usual step average ripples of its
+//!           size; at least 0.8 l, where the moves gained sqrt(D) times what the parabolas predict at least l
+//!           (a kink hides what the cost falls along), and at least 0.2 of the usual distance of two beetles
+//!           (beetles far apart sit in different ripples)
 //! Symbols as in adaptive.rs and frame.rs; h_j relative to the mean of the positive ones, limited to 1/4..4.
 //!
 //! Source: own experiments. Cost: 4 D^2 min(N, D) operations, the metric's; two square roots per direction.
@@ -29,6 +31,9 @@ const LONGEST_WHISKER: f64 = 0.3;
 /// Least ratio of the usual whisker length to that of the round before: the metric of a cost with a sharp
 /// ridge needs time to turn to the ridge.
 const LEAST_WHISKER_CHANGE: f64 = 0.8;
+/// Least whisker length, share of the median distance between two personal bests in metric coordinates:
+/// beetles far apart are in different ripples, and a whisker must average them.
+const WHISKER_PER_DISTANCE: f64 = 0.2;
 /// Decay per round without adaptation of the length ([`Part::WhiskerAdaptation`]).
 const WHISKER_DECAY: f64 = 0.95;
 /// Weight of the latest round in whisker length and convex share.
@@ -61,6 +66,14 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         let trust =
             if vote > T::zero() { self.trust * (T::one() + vote) } else { self.trust / (T::one() - vote) };
         self.trust = clamp(trust, T::from_double(LEAST_TRUST), T::one());
+    }
+
+    /// True if the moves gained over sqrt(D) times as much as the parabolas predicted: along a sharp ridge the
+    /// whiskers measure its kink. Whiskers sqrt(D) steps long find this ratio in the middle of a cone too.
+    pub(super) fn is_kinked(&self, before: &[T; N], found: &[T], dimension: usize) -> bool {
+        let gained =
+            before.iter().zip(found).fold(T::zero(), |sum, (&before, &found)| sum + (before - found));
+        self.predicted > T::zero() && gained > root::<T>(dimension) * self.predicted
     }
 
     /// Computes the gradient in box coordinates from the slopes along the frame: A^-T sum_j g_j z_j.
@@ -129,28 +142,38 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
     }
 
-    /// Moves the usual whisker length towards the usual step.
-    pub(super) fn learn_whisker(&mut self, dimension: usize) {
+    /// Moves the usual whisker length towards the usual step; at a kink not to a shorter one.
+    pub(super) fn learn_whisker(&mut self, dimension: usize, is_kinked: bool) {
         if !self.has(Part::WhiskerAdaptation) {
             self.whisker = limited(T::from_double(WHISKER_DECAY) * self.whisker);
             return;
         }
-        let mut steps = [T::zero(); N];
-        let mut read = 0;
-        for whisker in self.frame.whisker.iter().take(self.frame.count()) {
-            if let Some(reading) = whisker.reading {
-                steps[read.min(N - 1)] = abs(reading.step);
-                read += 1;
-            }
-        }
-        if read == 0 {
-            return;
-        }
-        let median = median(live_mut(&mut steps, read));
-        let root = sqrt(nalgebra::convert::<f32, T>(dimension as f32));
-        let shortest = T::from_double(LEAST_WHISKER_CHANGE) * self.whisker;
-        self.whisker = limited(max(smoothed(self.whisker, root * median), shortest));
+        let whiskers = || self.frame.whisker.iter().take(self.frame.count());
+        let steps = whiskers().filter_map(|whisker| whisker.reading).map(|reading| abs(reading.step));
+        let Some(step) = median_of::<T, N>(steps) else { return };
+        let distances = whiskers().map(|whisker| whisker.distance).filter(|&distance| distance >= T::zero());
+        let distance = median_of::<T, N>(distances).unwrap_or(T::zero());
+        let least_change = if is_kinked { T::one() } else { T::from_double(LEAST_WHISKER_CHANGE) };
+        let shortest = max(least_change * self.whisker, T::from_double(WHISKER_PER_DISTANCE) * distance);
+        let usual = root::<T>(dimension) * step;
+        self.whisker = limited(max(smoothed(self.whisker, usual), shortest));
     }
+}
+
+/// Median of at most N values; `None` of none.
+fn median_of<T: Real, const N: usize>(values: impl Iterator<Item = T>) -> Option<T> {
+    let mut all = [T::zero(); N];
+    let mut count = 0;
+    for (entry, value) in all.iter_mut().zip(values) {
+        *entry = value;
+        count += 1;
+    }
+    (count > 0).then(|| median(live_mut(&mut all, count)))
+}
+
+/// Square root of the number of coordinates.
+fn root<T: Real>(dimension: usize) -> T {
+    sqrt(nalgebra::convert::<f32, T>(dimension as f32))
 }
 
 fn limited<T: Real>(whisker: T) -> T {
@@ -159,4 +182,53 @@ fn limited<T: Real>(whisker: T) -> T {
 
 fn smoothed<T: Real>(before: T, now: T) -> T {
     T::from_double(1.0 - SMOOTHING) * before + T::from_double(SMOOTHING) * now
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::frame::Reading;
+    use super::super::settings::AdaptiveSettings;
+    use super::*;
+
+    const N: usize = 4;
+    const D: usize = 4;
+
+    /// Rules whose whiskers were 0.1 long and measured steps of 0.001.
+    fn measured() -> AdaptiveRules<f64, N, D> {
+        let mut rules = AdaptiveRules::new(AdaptiveSettings::default(), D);
+        for whisker in &mut rules.frame.whisker {
+            whisker.reading = Some(Reading { slope: -1e-3, curvature: 1.0, step: 1e-3, convex: true });
+        }
+        rules
+    }
+
+    #[test]
+    fn whiskers_get_shorter_with_the_steps_but_not_at_a_kink() {
+        for (is_kinked, expected) in [(false, 0.08), (true, 0.1)] {
+            let mut rules = measured();
+            rules.learn_whisker(D, is_kinked);
+            assert!(abs(rules.whisker - expected) < 1e-15, "{}", rules.whisker);
+        }
+    }
+
+    #[test]
+    fn whiskers_reach_a_fifth_of_the_way_to_the_other_beetles() {
+        let mut rules = measured();
+        for (whisker, distance) in rules.frame.whisker.iter_mut().zip([-1.0, 0.7, 0.0, 20.0]) {
+            whisker.distance = distance;
+        }
+        rules.learn_whisker(D, false);
+        assert!(abs(rules.whisker - 0.14) < 1e-15, "{}", rules.whisker);
+    }
+
+    #[test]
+    fn a_kink_is_a_gain_of_root_d_times_the_predicted_one() {
+        let mut rules = measured();
+        rules.predicted = 3.0;
+        let before = [2.0; N];
+        assert!(!rules.is_kinked(&before, &[0.0, 0.1, 1.0, 1.0], D), "gained 5.9 of 6");
+        assert!(rules.is_kinked(&before, &[0.0, 0.0, 1.0, 0.9], D));
+        rules.predicted = -1.0;
+        assert!(!rules.is_kinked(&before, &[0.0; N], D));
+    }
 }

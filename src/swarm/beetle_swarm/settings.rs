@@ -58,7 +58,7 @@ pub struct AdaptiveSettings<T> {
     /// Rounds without progress before the swarm leaps or, in the end, is scattered
     /// again; default 8, at least 1.
     pub patience: u32,
-    /// Failed leaps in a row that are allowed before the swarm is scattered again; default 8.
+    /// Failed leaps in a row that are allowed before the swarm is scattered again; default 4.
     pub leaps: u32,
     /// Part to disable, to measure its contribution; default none.
     pub without: Option<Part>,
@@ -100,7 +100,7 @@ impl<T: Real> Default for AdaptiveSettings<T> {
             step_limit: T::from_double(0.5),
             pair_directions: 12,
             patience: 8,
-            leaps: 8,
+            leaps: 4,
             without: None,
         }
     }
