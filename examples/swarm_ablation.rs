@@ -10,11 +10,17 @@
 use std::sync::Mutex;
 use std::thread;
 
-use scarab::real::{Real, sin_cos, sqrt};
+use scarab::real::{Real, sqrt};
 use scarab::swarm::{
     AdaptiveSettings, Bso, BsoSettings, Objective, Part, Random, Search, SwarmError, TestFunction,
     TestProblem,
 };
+
+use crate::functions::{Instance, Shape, quantile};
+
+#[path = "swarm_rotated/functions.rs"]
+#[allow(dead_code, reason = "the other example uses more of it")]
+mod functions;
 
 const BEETLES: usize = 20;
 const CAPACITY: usize = 30;
@@ -63,8 +69,8 @@ fn main() -> Result<(), SwarmError> {
     }
     println!("{}", line::<f32>("nothing, single precision", AdaptiveSettings::default(), runs, first_seed)?);
     plane(runs, first_seed)?;
-    noise(runs, first_seed)?;
-    rugged(runs, first_seed)
+    rotated(runs, first_seed)?;
+    noise(runs, first_seed)
 }
 
 /// The complete swarm, and every part that can be disabled.
@@ -168,6 +174,38 @@ fn plane(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
     Ok(())
 }
 
+/// Median of evaluations of the whole swarm and its variants on rotated functions.
+fn rotated(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
+    const ROTATED: [(&str, Shape, usize, f64); 6] = [
+        ("ellipsoid 10", Shape::Ellipsoid, 10, 1e-6),
+        ("bent cigar 10", Shape::BentCigar, 10, 1e-6),
+        ("sharp ridge 10", Shape::SharpRidge, 10, 1e-6),
+        ("powers 10", Shape::Powers, 10, 1e-6),
+        ("Rastrigin 10", Shape::Rastrigin, 10, 0.1),
+        ("Ackley 10", Shape::Ackley, 10, 0.1),
+    ];
+    let names = ROTATED.map(|(name, ..)| name).join(" | ");
+    println!("\n| without | {names} |\n|{}", " --- |".repeat(ROTATED.len() + 1));
+    for (name, settings) in variants::<f64>() {
+        let mut line = format!("| {name} |");
+        for (_, shape, dimension, goal) in ROTATED {
+            let mut arrived = Vec::new();
+            for seed in first_seed..first_seed + runs {
+                arrived
+                    .extend(Instance::new(shape, dimension, true, seed).evaluations(settings, goal, seed)?);
+            }
+            let share = if arrived.len() as u64 == runs {
+                String::new()
+            } else {
+                format!(" ({:.1} %)", 100.0 * arrived.len() as f64 / runs as f64)
+            };
+            line += &format!(" {}{share} |", quantile(&mut arrived, runs, 0.5));
+        }
+        println!("{line}");
+    }
+    Ok(())
+}
+
 /// A test function with independent noise in every call.
 struct Noisy {
     problem: TestProblem,
@@ -216,72 +254,6 @@ fn noise(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
             line += &format!(" {:.1e} |", values[values.len() / 2]);
         }
         println!("{line}");
-    }
-    Ok(())
-}
-
-/// Rastrigin's function, shifted by up to half a unit, with scaled coordinates, and reflected where
-/// `slanted`.
-struct Rugged {
-    problem: TestProblem,
-    scale: f64,
-    slanted: bool,
-}
-
-impl Objective<f64> for Rugged {
-    fn dimension(&self) -> usize {
-        Objective::<f64>::dimension(&self.problem)
-    }
-    fn bounds(&self, coordinate: usize) -> (f64, f64) {
-        self.problem.bounds(coordinate)
-    }
-    fn evaluate(&self, position: &[f64]) -> f64 {
-        let mut moved: Vec<f64> = position
-            .iter()
-            .enumerate()
-            .map(|(index, x)| self.scale * (x - ((37 * index + 5) % 11) as f64 / 11.0 + 0.5))
-            .collect();
-        if self.slanted {
-            // a reflection: y - 2 w (w.y) / (w.w)
-            let mirror: Vec<f64> = (0..moved.len()).map(|index| sin_cos(index as f64 + 1.0).0).collect();
-            let along: f64 = mirror.iter().zip(&moved).map(|(w, y)| w * y).sum();
-            let length: f64 = mirror.iter().map(|w| w * w).sum();
-            for (y, w) in moved.iter_mut().zip(&mirror) {
-                *y -= 2.0 * w * along / length;
-            }
-        }
-        self.problem.evaluate(&moved)
-    }
-}
-
-/// Prints how far the leaps reach on rugged functions.
-fn rugged(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
-    println!("\n| Rastrigin, shifted | iterations | evaluations, median |\n| --- | --- | --- |");
-    for (name, dimension, scale, slanted) in [
-        ("5 dimensions", 5, 1.0, false),
-        ("10 dimensions", 10, 1.0, false),
-        ("10, ripples twice as wide", 10, 0.5, false),
-        ("10, ripples half as wide", 10, 2.0, false),
-        ("10, ripples a third as wide", 10, 3.0, false),
-        ("10, rotated", 10, 1.0, true),
-        ("20 dimensions", 20, 1.0, false),
-        ("30 dimensions", 30, 1.0, false),
-    ] {
-        let problem = TestProblem::new(TestFunction::Rastrigin, dimension);
-        let rugged = Rugged { problem, scale, slanted };
-        let (mut reached, mut evaluations) = (Vec::new(), Vec::new());
-        for seed in first_seed..first_seed + runs {
-            let settings = BsoSettings::default();
-            let mut swarm = Bso::<f64, BEETLES, CAPACITY>::new(&rugged, settings, seed)?;
-            if swarm.reach(&rugged, TOLERANCE, ITERATIONS) {
-                reached.push(swarm.iterations());
-                evaluations.push(swarm.evaluations());
-            }
-        }
-        evaluations.sort_unstable();
-        let median = evaluations.get((runs as usize).div_ceil(2) - 1);
-        let median = median.map_or_else(|| "-".to_owned(), u32::to_string);
-        println!("| {name} | {} | {median} |", cell(reached, runs));
     }
     Ok(())
 }

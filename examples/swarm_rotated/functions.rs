@@ -8,10 +8,10 @@
 //! discus           1e6 z_0^2 + sum_(i > 0) z_i^2
 //! bent cigar       y_0^2 + 1e6 sum_(i > 0) y_i^2,   y = R p
 //!                  p_i = z_i^(1 + c_i sqrt(z_i) / 2) if z_i > 0, else z_i
-//! sharp ridge      y_0^2 + 100 sqrt(sum_(i > 0) y_i^2),   y_i = 10^(c_i / 2) z_i
+//! sharp ridge      y_0^2 + 100 sqrt(sum_(i > 0) y_i^2),   y = R p,   p_i = 10^(c_i / 2) z_i; or y = p
 //! powers           sqrt(sum |z_i|^(2 + 4 c_i))
 //! Rosenbrock       sum 100 (y_i^2 - y_(i+1))^2 + (y_i - 1)^2,   y = z + 1
-//! Rastrigin        10 D + sum z_i^2 - 10 cos 2 pi z_i
+//! Rastrigin        10 D + sum y_i^2 - 10 cos 2 pi y_i,   y = s z
 //! Ackley           that of scarab::swarm, of 6.4 z
 //! ```
 //!
@@ -19,8 +19,11 @@
 //! Definitions; some of its transforms are left out.
 
 use scarab::real::{exp, ln, sqrt};
-use scarab::swarm::{Objective, Random, TestFunction, TestProblem};
+use scarab::swarm::{
+    AdaptiveSettings, Bso, BsoSettings, Objective, Random, Search, SwarmError, TestFunction, TestProblem,
+};
 
+const EVALUATIONS_PER_DIMENSION: u32 = 2_000;
 /// Half width of the box.
 const HALF_WIDTH: f64 = 5.0;
 
@@ -30,6 +33,8 @@ pub enum Shape {
     Discus,
     BentCigar,
     SharpRidge,
+    /// The sharp ridge along one of its axes.
+    ScaledRidge,
     Powers,
     Rosenbrock,
     Rastrigin,
@@ -41,6 +46,8 @@ pub enum Shape {
 pub struct Instance {
     pub shape: Shape,
     pub rotation: Vec<Vec<f64>>,
+    /// Scale s of Rastrigin's function: ripples are 1 / s apart.
+    pub scale: f64,
     pub minimiser: Vec<f64>,
     pub factor: f64,
     pub constant: f64,
@@ -54,7 +61,25 @@ impl Instance {
         let reach = if shape == Shape::Rosenbrock { 3.0 } else { 4.0 };
         let minimiser = (0..dimension).map(|_| reach * random.signed::<f64>()).collect();
         let rotation = if is_rotated { rotation(dimension, &mut random) } else { identity(dimension) };
-        Self { shape, rotation, minimiser, factor: 1.0, constant: 0.0 }
+        Self { shape, rotation, scale: 1.0, minimiser, factor: 1.0, constant: 0.0 }
+    }
+
+    /// Evaluations until the swarm comes within `goal` of the minimum; `None` within 2,000 per dimension.
+    pub fn evaluations(
+        &self,
+        settings: AdaptiveSettings<f64>,
+        goal: f64,
+        seed: u64,
+    ) -> Result<Option<u32>, SwarmError> {
+        let mut swarm = Box::new(Bso::<f64, 20, 30>::new(self, BsoSettings::Adaptive(settings), seed)?);
+        let most = EVALUATIONS_PER_DIMENSION * self.minimiser.len() as u32;
+        while swarm.evaluations() < most {
+            swarm.advance(self, 1);
+            if swarm.best().is_some_and(|best| best.value - self.constant <= self.factor * goal) {
+                return Ok(Some(swarm.evaluations()));
+            }
+        }
+        Ok(None)
     }
 
     fn cost(&self, x: &[f64]) -> f64 {
@@ -73,13 +98,14 @@ impl Instance {
                 let y = product(&self.rotation, &indexed().map(bent).collect::<Vec<f64>>());
                 y[0] * y[0] + 1e6 * squares(&y[1..])
             }
-            Shape::SharpRidge => {
-                let y: Vec<f64> = indexed().map(|(share, z)| power(10.0, 0.5 * share) * z).collect();
+            Shape::SharpRidge | Shape::ScaledRidge => {
+                let p: Vec<f64> = indexed().map(|(share, z)| power(10.0, 0.5 * share) * z).collect();
+                let y = if self.shape == Shape::SharpRidge { product(&self.rotation, &p) } else { p };
                 y[0] * y[0] + 100.0 * sqrt(squares(&y[1..]))
             }
             Shape::Powers => sqrt(indexed().map(|(share, z)| power(z.abs(), 2.0 + 4.0 * share)).sum::<f64>()),
             Shape::Rosenbrock => of(TestFunction::Rosenbrock, z.iter().map(|z| z + 1.0)),
-            Shape::Rastrigin => of(TestFunction::Rastrigin, z.iter().copied()),
+            Shape::Rastrigin => of(TestFunction::Rastrigin, z.iter().map(|z| self.scale * z)),
             Shape::Ackley => of(TestFunction::Ackley, z.iter().map(|z| 6.4 * z)),
         }
     }
@@ -97,6 +123,13 @@ impl Objective<f64> for Instance {
     fn evaluate(&self, position: &[f64]) -> f64 {
         self.factor * self.cost(position) + self.constant
     }
+}
+
+/// Evaluations of these runs in order that a share of the runs needs; "-" where fewer arrive.
+pub fn quantile(arrived: &mut [u32], runs: u64, share: f64) -> String {
+    arrived.sort_unstable();
+    let rank = (share * runs as f64).ceil() as usize;
+    arrived.get(rank.max(1) - 1).map_or_else(|| "-".to_owned(), u32::to_string)
 }
 
 /// A positive number, or 0, to a positive power.

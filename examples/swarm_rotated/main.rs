@@ -9,31 +9,34 @@
 use std::sync::Mutex;
 use std::thread;
 
-use scarab::swarm::{Bso, BsoSettings, Search, SwarmError};
+use scarab::swarm::{AdaptiveSettings, SwarmError};
 
-use crate::functions::{Instance, Shape};
+use crate::functions::{Instance, Shape, quantile};
 
 mod functions;
 
-const EVALUATIONS_PER_DIMENSION: u32 = 2_000;
 const FIRST_SEED: u64 = 700_000_001;
 const THREADS: usize = 2;
 
-/// Name, function, whether it is rotated, constant that is added, goal above the minimum, dimensions.
-type Row = (&'static str, Shape, bool, f64, f64, &'static [usize]);
+/// Name, function, whether it is rotated, scale, constant that is added, goal above the minimum, dimensions.
+type Row = (&'static str, Shape, bool, f64, f64, f64, &'static [usize]);
 
-const ROWS: [Row; 11] = [
-    ("ellipsoid", Shape::Ellipsoid, true, 0.0, 1e-6, &[2, 10, 30]),
-    ("ellipsoid + 1000", Shape::Ellipsoid, true, 1e3, 1e-6, &[10]),
-    ("discus", Shape::Discus, true, 0.0, 1e-6, &[10, 30]),
-    ("bent cigar", Shape::BentCigar, true, 0.0, 1e-6, &[2, 10, 30]),
-    ("bent cigar + 1000", Shape::BentCigar, true, 1e3, 1e-6, &[10]),
-    ("sharp ridge", Shape::SharpRidge, true, 0.0, 1e-6, &[2, 10, 20]),
-    ("powers", Shape::Powers, true, 0.0, 1e-6, &[10]),
-    ("Rosenbrock along the box", Shape::Rosenbrock, false, 0.0, 1e-6, &[10, 30]),
-    ("Rastrigin", Shape::Rastrigin, true, 0.0, 0.1, &[2, 10, 20, 30]),
-    ("Rastrigin along the box", Shape::Rastrigin, false, 0.0, 0.1, &[10]),
-    ("Ackley", Shape::Ackley, true, 0.0, 0.1, &[10, 30]),
+const ROWS: [Row; 15] = [
+    ("ellipsoid", Shape::Ellipsoid, true, 1.0, 0.0, 1e-6, &[2, 10, 30]),
+    ("ellipsoid + 1000", Shape::Ellipsoid, true, 1.0, 1e3, 1e-6, &[10]),
+    ("discus", Shape::Discus, true, 1.0, 0.0, 1e-6, &[10, 30]),
+    ("bent cigar", Shape::BentCigar, true, 1.0, 0.0, 1e-6, &[2, 10, 30]),
+    ("bent cigar + 1000", Shape::BentCigar, true, 1.0, 1e3, 1e-6, &[10]),
+    ("sharp ridge", Shape::SharpRidge, true, 1.0, 0.0, 1e-6, &[2, 10, 20]),
+    ("sharp ridge, y = p", Shape::ScaledRidge, true, 1.0, 0.0, 1e-6, &[10]),
+    ("powers", Shape::Powers, true, 1.0, 0.0, 1e-6, &[10]),
+    ("Rosenbrock along the box", Shape::Rosenbrock, false, 1.0, 0.0, 1e-6, &[10, 30]),
+    ("Rastrigin", Shape::Rastrigin, true, 1.0, 0.0, 0.1, &[2, 10, 20, 30]),
+    ("Rastrigin, s = 1/2", Shape::Rastrigin, true, 0.5, 0.0, 0.1, &[10]),
+    ("Rastrigin, s = 2", Shape::Rastrigin, true, 2.0, 0.0, 0.1, &[10]),
+    ("Rastrigin, s = 3", Shape::Rastrigin, true, 3.0, 0.0, 0.1, &[10]),
+    ("Rastrigin along the box", Shape::Rastrigin, false, 1.0, 0.0, 0.1, &[10]),
+    ("Ackley", Shape::Ackley, true, 1.0, 0.0, 0.1, &[10, 30]),
 ];
 
 fn main() -> Result<(), SwarmError> {
@@ -45,7 +48,7 @@ fn main() -> Result<(), SwarmError> {
         "| function, to | D | runs that arrive | evaluations, median | 90 % |\n| --- | --- | --- | --- | --- |"
     );
     let cases: Vec<(&Row, usize)> =
-        ROWS.iter().flat_map(|row| row.5.iter().map(move |dimension| (row, *dimension))).collect();
+        ROWS.iter().flat_map(|row| row.6.iter().map(move |dimension| (row, *dimension))).collect();
     let lines = Mutex::new(vec![Ok(String::new()); cases.len()]);
     let next = Mutex::new(0..cases.len());
     thread::scope(|scope| {
@@ -67,30 +70,13 @@ fn main() -> Result<(), SwarmError> {
 }
 
 fn line(row: &Row, dimension: usize, runs: u64, first_seed: u64) -> Result<String, SwarmError> {
-    let (name, shape, is_rotated, constant, goal, _) = *row;
+    let (name, shape, is_rotated, scale, constant, goal, _) = *row;
     let mut arrived = Vec::new();
     for seed in first_seed..first_seed + runs {
-        let cost = Instance { constant, ..Instance::new(shape, dimension, is_rotated, seed) };
-        let mut swarm = Box::new(Bso::<f64, 20, 30>::new(&cost, BsoSettings::default(), seed)?);
-        let most = EVALUATIONS_PER_DIMENSION * dimension as u32;
-        let is_there =
-            |swarm: &Bso<f64, 20, 30>| swarm.best().is_some_and(|best| best.value - constant <= goal);
-        while !is_there(&swarm) && swarm.evaluations() < most {
-            swarm.advance(&cost, 1);
-        }
-        if is_there(&swarm) {
-            arrived.push(swarm.evaluations());
-        }
+        let cost = Instance { scale, constant, ..Instance::new(shape, dimension, is_rotated, seed) };
+        arrived.extend(cost.evaluations(AdaptiveSettings::default(), goal, seed)?);
     }
-    arrived.sort_unstable();
-    let quantile = |share: f64| {
-        let rank = (share * runs as f64).ceil() as usize;
-        arrived.get(rank.max(1) - 1).map_or_else(|| "-".to_owned(), u32::to_string)
-    };
     let count = arrived.len();
-    Ok(format!(
-        "| {name}, {goal:e} | {dimension} | {count} of {runs} | {} | {} |",
-        quantile(0.5),
-        quantile(0.9)
-    ))
+    let [median, most] = [0.5, 0.9].map(|share| quantile(&mut arrived, runs, share));
+    Ok(format!("| {name}, {goal:e} | {dimension} | {count} of {runs} | {median} | {most} |"))
 }

@@ -6,7 +6,7 @@
 //!   al_j  = 1 + rate gate (1 / sqrt(h_j / mean h) - 1), over its mean: stretch of A along z_j; gate is 0
 //!           up to 70 % of convex readings and 1 at 100 %, so that ripples have no effect
 //!   l     = 0.7 l + 0.3 sqrt(D) median |s_j|: whiskers as long as the usual step average ripples of its
-//!           size; at least 0.8 l, where the moves gained sqrt(D) times what the parabolas predict at least l
+//!           size; at least 0.8 l; at least l where the moves gained max(3, sqrt(D)) times the predicted decrease
 //!           (a kink hides what the cost falls along), and at least 0.2 of the usual distance of two beetles
 //!           (beetles far apart sit in different ripples)
 //! Symbols as in adaptive.rs and frame.rs; h_j relative to the mean of the positive ones, limited to 1/4..4.
@@ -34,6 +34,8 @@ const LEAST_WHISKER_CHANGE: f64 = 0.8;
 /// Least whisker length, share of the median distance between two personal bests in metric coordinates:
 /// beetles far apart are in different ripples, and a whisker must average them.
 const WHISKER_PER_DISTANCE: f64 = 0.2;
+/// Least ratio of gained to predicted decrease that shows a kink; sqrt(D) where that is more.
+const LEAST_KINK: f64 = 3.0;
 /// Decay per round without adaptation of the length ([`Part::WhiskerAdaptation`]).
 const WHISKER_DECAY: f64 = 0.95;
 /// Weight of the latest round in whisker length and convex share.
@@ -68,12 +70,13 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.trust = clamp(trust, T::from_double(LEAST_TRUST), T::one());
     }
 
-    /// True if the moves gained over sqrt(D) times as much as the parabolas predicted: along a sharp ridge the
-    /// whiskers measure its kink. Whiskers sqrt(D) steps long find this ratio in the middle of a cone too.
+    /// True if the moves gained far more than the parabolas predicted: along a sharp ridge the whiskers measure
+    /// its kink. Whiskers sqrt(D) steps long see that ratio in the middle of a cone too, where it is harmless.
     pub(super) fn is_kinked(&self, before: &[T; N], found: &[T], dimension: usize) -> bool {
         let gained =
             before.iter().zip(found).fold(T::zero(), |sum, (&before, &found)| sum + (before - found));
-        self.predicted > T::zero() && gained > root::<T>(dimension) * self.predicted
+        let ratio = max(T::from_double(LEAST_KINK), root(dimension));
+        self.predicted > T::zero() && gained > ratio * self.predicted
     }
 
     /// Computes the gradient in box coordinates from the slopes along the frame: A^-T sum_j g_j z_j.
@@ -150,9 +153,9 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
         let whiskers = || self.frame.whisker.iter().take(self.frame.count());
         let steps = whiskers().filter_map(|whisker| whisker.reading).map(|reading| abs(reading.step));
-        let Some(step) = median_of::<T, N>(steps) else { return };
+        let Some(step) = median_of::<T, N>(steps, 1) else { return };
         let distances = whiskers().map(|whisker| whisker.distance).filter(|&distance| distance >= T::zero());
-        let distance = median_of::<T, N>(distances).unwrap_or(T::zero());
+        let distance = median_of::<T, N>(distances, 2).unwrap_or(T::zero());
         let least_change = if is_kinked { T::one() } else { T::from_double(LEAST_WHISKER_CHANGE) };
         let shortest = max(least_change * self.whisker, T::from_double(WHISKER_PER_DISTANCE) * distance);
         let usual = root::<T>(dimension) * step;
@@ -160,15 +163,15 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     }
 }
 
-/// Median of at most N values; `None` of none.
-fn median_of<T: Real, const N: usize>(values: impl Iterator<Item = T>) -> Option<T> {
+/// Median of at most N values; `None` of fewer than `least`.
+fn median_of<T: Real, const N: usize>(values: impl Iterator<Item = T>, least: usize) -> Option<T> {
     let mut all = [T::zero(); N];
     let mut count = 0;
     for (entry, value) in all.iter_mut().zip(values) {
         *entry = value;
         count += 1;
     }
-    (count > 0).then(|| median(live_mut(&mut all, count)))
+    (count >= least).then(|| median(live_mut(&mut all, count)))
 }
 
 /// Square root of the number of coordinates.
@@ -222,9 +225,9 @@ mod tests {
     }
 
     #[test]
-    fn a_kink_is_a_gain_of_root_d_times_the_predicted_one() {
+    fn a_kink_is_a_gain_of_three_times_the_predicted_one() {
         let mut rules = measured();
-        rules.predicted = 3.0;
+        rules.predicted = 2.0;
         let before = [2.0; N];
         assert!(!rules.is_kinked(&before, &[0.0, 0.1, 1.0, 1.0], D), "gained 5.9 of 6");
         assert!(rules.is_kinked(&before, &[0.0, 0.0, 1.0, 0.9], D));
