@@ -2,7 +2,8 @@
 //!
 //! The main mechanism: the whiskers of the best beetles together make a Newton step in the subspace of their
 //! frame, in a metric they learn. The velocity of Eq. (19), with one pair of random numbers for a beetle,
-//! contributes little: it shortens the way along Rosenbrock's valley. In order of importance:
+//! contributes little: it shortens the way along Rosenbrock's valley and into Ackley's cone. In order of
+//! importance:
 //! 1. Shared scent: every beetle steps along all directions of the frame, not only along its own.
 //! 2. Learned metric: measured curvature stretches it; disabled where readings are not convex (ripples).
 //! 3. Retreat: a move to a value worse than the previous one and the personal best is undone.

@@ -6,9 +6,9 @@
 //!   al_j  = 1 + rate gate (1 / sqrt(h_j / mean h) - 1), over its mean: stretch of A along z_j; gate is 0
 //!           up to 70 % of convex readings and 1 at 100 %, so that ripples have no effect
 //!   l     = 0.7 l + 0.3 sqrt(D) median |s_j|: whiskers as long as the usual step average ripples of its
-//!           size; at least 0.8 l; at least l where the moves gained max(3, sqrt(D)) times the predicted decrease
-//!           (a kink hides what the cost falls along), and at least 0.2 of the usual distance of two beetles
-//!           (beetles far apart sit in different ripples)
+//!           size; at least 0.8 l; at least l where the moves gained max(3, sqrt(D)) times the predicted
+//!           decrease (a kink hides what the cost falls along), and at least 0.2 of the usual distance of two
+//!           beetles (beetles far apart sit in different ripples)
 //! Symbols as in adaptive.rs and frame.rs; h_j relative to the mean of the positive ones, limited to 1/4..4.
 //!
 //! Source: own experiments. Cost: 4 D^2 min(N, D) operations, the metric's; two square roots per direction.
@@ -70,8 +70,9 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         self.trust = clamp(trust, T::from_double(LEAST_TRUST), T::one());
     }
 
-    /// True if the moves gained far more than the parabolas predicted: along a sharp ridge the whiskers measure
-    /// its kink. Whiskers sqrt(D) steps long see that ratio in the middle of a cone too, where it is harmless.
+    /// True if the moves gained far more than the parabolas predicted: along a sharp ridge the whiskers
+    /// measure its kink. Whiskers sqrt(D) steps long find a ratio of sqrt(D) on a cone too, which needs no
+    /// longer whiskers.
     pub(super) fn is_kinked(&self, before: &[T; N], found: &[T], dimension: usize) -> bool {
         let gained =
             before.iter().zip(found).fold(T::zero(), |sum, (&before, &found)| sum + (before - found));
