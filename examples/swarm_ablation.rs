@@ -91,12 +91,15 @@ fn variants<T: Real>() -> Vec<(&'static str, AdaptiveSettings<T>)> {
         ("convexity gate", without(Part::ConvexityGate)),
         ("retreat", without(Part::Retreat)),
         ("whisker adaptation: 5 % shorter each time", without(Part::WhiskerAdaptation)),
+        ("kink: whiskers shrink at kinks too", without(Part::Kink)),
+        ("distance of beetles: no whisker for it", without(Part::Distance)),
         ("pair directions", AdaptiveSettings { pair_directions: 0, ..whole }),
         ("gradient direction", without(Part::GradientDirection)),
         ("trust adaptation: full trust", without(Part::TrustAdaptation)),
         ("ranking: always the same readers", without(Part::Ranking)),
         ("moves for the best: all move in every round", without(Part::BestMove)),
         ("velocity", still),
+        ("four failed leaps: eight", AdaptiveSettings { leaps: 8, ..whole }),
         ("leaps: scattered after 25 iterations", AdaptiveSettings { leaps: 0, patience: 25, ..whole }),
         ("leaps and scattering", AdaptiveSettings { patience: u32::MAX, ..whole }),
     ]
@@ -126,14 +129,14 @@ fn line<T: Real>(
 }
 
 fn cell(mut reached: Vec<u32>, runs: u64) -> String {
-    reached.sort_unstable();
-    let quantile = |share: f64| {
-        let rank = (share * runs as f64).ceil() as usize;
-        reached.get(rank.max(1) - 1).map_or_else(|| "-".to_owned(), u32::to_string)
-    };
-    let share = 100.0 * reached.len() as f64 / runs as f64;
-    let success = if share < 100.0 { format!(" ({share:.1} %)") } else { String::new() };
-    format!("{}/{}{success}", quantile(0.5), quantile(0.95))
+    let success = success(reached.len(), runs);
+    format!("{}/{}{success}", quantile(&mut reached, runs, 0.5), quantile(&mut reached, runs, 0.95))
+}
+
+/// Share of runs that arrive, in brackets; empty where all do.
+fn success(arrived: usize, runs: u64) -> String {
+    let share = 100.0 * arrived as f64 / runs as f64;
+    if arrived as u64 == runs { String::new() } else { format!(" ({share:.1} %)") }
 }
 
 /// Evaluations in the plane, where a round moves few of the beetles: to f - f* <= 0.1, median.
@@ -194,12 +197,8 @@ fn rotated(runs: u64, first_seed: u64) -> Result<(), SwarmError> {
                 arrived
                     .extend(Instance::new(shape, dimension, true, seed).evaluations(settings, goal, seed)?);
             }
-            let share = if arrived.len() as u64 == runs {
-                String::new()
-            } else {
-                format!(" ({:.1} %)", 100.0 * arrived.len() as f64 / runs as f64)
-            };
-            line += &format!(" {}{share} |", quantile(&mut arrived, runs, 0.5));
+            let success = success(arrived.len(), runs);
+            line += &format!(" {}{success} |", quantile(&mut arrived, runs, 0.5));
         }
         println!("{line}");
     }

@@ -91,20 +91,20 @@ fn adaptive_swarm_meets_its_table_in_two_dimensions() {
     gate_both(TestFunction::Sphere, 2, 100, 3, 5); // 2 / 3
     gate_both(TestFunction::SixHumpCamel, 2, 100, 3, 9); // 2 / 5
     gate_both(TestFunction::Branin, 2, 100, 2, 4); // 1 / 2
-    gate_both(TestFunction::Ackley, 2, 100, 6, 9); // 4 / 6
-    gate_both(TestFunction::ShiftedRotatedAckley, 2, 100, 6, 9); // 4 / 6
+    gate_both(TestFunction::Ackley, 2, 100, 6, 12); // 4 / 8
+    gate_both(TestFunction::ShiftedRotatedAckley, 2, 100, 6, 12); // 4 / 8
 }
 
 #[test]
 fn adaptive_swarm_meets_its_table_in_thirty_dimensions() {
     gate_both(TestFunction::Sphere, 30, 40, 20, 28); // 16 / 19
     gate_both(TestFunction::Ackley, 30, 60, 28, 40); // 22 / 25
-    gate_both(TestFunction::ShiftedGriewank, 30, 40, 29, 40); // 23 / 27
+    gate_both(TestFunction::ShiftedGriewank, 30, 40, 27, 36); // 18 / 23
 }
 
 #[test]
 fn rotation_and_shift_do_not_stop_the_adaptive_swarm() {
-    // Known: 25 / 28 iterations, 100 % of 1,000 runs; 0 % without sharing.
+    // Known: 25 / 28 iterations, 100 %; 60 % within 1,000 iterations without sharing.
     let problem = TestProblem::new(TestFunction::ShiftedRotatedAckley, 30);
     for tally in both(problem, 100) {
         assert!(tally.success() >= 0.98, "success {}", tally.success());
@@ -114,27 +114,27 @@ fn rotation_and_shift_do_not_stop_the_adaptive_swarm() {
 
 #[test]
 fn the_learned_metric_solves_bad_scaling_valleys_and_coupling() {
-    gate_both(TestFunction::ShiftedEllipsoid, 30, 15, 85, 115); // 68 / 76, condition 1e4
-    gate_both(TestFunction::Rosenbrock, 10, 40, 105, 145); // 82 / 96
+    gate_both(TestFunction::ShiftedEllipsoid, 30, 15, 100, 135); // 80 / 93, condition 1e4
+    gate_both(TestFunction::Rosenbrock, 10, 40, 105, 135); // 76 / 89
     gate_both(TestFunction::ShiftedSchwefel, 30, 15, 75, 100); // 60 / 67
 }
 
 #[test]
 fn restarts_escape_local_minima() {
-    gate_both(TestFunction::Levy, 10, 60, 25, 160); // 15 / 77, the tail being restarted runs
-    gate_both(TestFunction::Rastrigin, 2, 60, 30, 120); // 15 / 64
+    gate_both(TestFunction::Levy, 10, 60, 25, 40); // 15 / 22
+    gate_both(TestFunction::Rastrigin, 2, 60, 30, 80); // 15 / 40
 }
 
 #[test]
 fn leaps_escape_ripples_that_restarts_do_not() {
-    // Known: 320 to 390 / 500 to 720 iterations, 97 to 100 %; without leaps 0 of 200 runs.
+    // Known: 86 to 101 / 151 to 165 iterations, 100 %; without leaps 0 of 200 runs.
     let problem = TestProblem::new(TestFunction::Rastrigin, 10);
     let scattered =
         BsoSettings::Adaptive(AdaptiveSettings { leaps: 0, patience: 25, ..AdaptiveSettings::default() });
     assert_eq!(bso::<f64>(problem, 0.1, 10, scattered).success(), 0.0);
     for tally in both(problem, 25) {
-        assert!(tally.success() >= 0.8, "success {}", tally.success());
-        assert!(tally.quantile(0.5) <= 550, "{}", tally.quantile(0.5));
+        assert!(tally.success() >= 1.0, "success {}", tally.success());
+        assert!(tally.quantile(0.5) <= 160, "{}", tally.quantile(0.5));
     }
 }
 
@@ -166,7 +166,7 @@ fn adaptive_swarm_needs_fewer_evaluations_than_a_particle_swarm() {
 
 #[test]
 fn moving_only_the_best_saves_evaluations_in_the_plane() {
-    // Known medians, best against all: 106 and 173, 362 and 772. The test requires three quarters. From 10
+    // Known medians, best against all: 113 and 174, 393 and 1,153. The test requires three quarters. From 10
     // dimensions on all beetles move.
     let without = Some(Part::BestMove);
     let all = BsoSettings::Adaptive(AdaptiveSettings { without, ..AdaptiveSettings::default() });
@@ -183,8 +183,8 @@ fn moving_only_the_best_saves_evaluations_in_the_plane() {
 }
 
 #[test]
-fn search_works_almost_as_well_without_velocity() {
-    // Without any velocity the medians are about 24 and 33 instead of 23 and 25 iterations.
+fn search_converges_without_velocity() {
+    // Known medians without any velocity: 31 and 33 iterations instead of 23 and 25.
     let still = AdaptiveSettings {
         inertia_weight: 0.0,
         individual_learning: 0.0,

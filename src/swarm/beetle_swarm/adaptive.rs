@@ -15,14 +15,14 @@
 //! om_i is the trust in the other beetles' whiskers: 1.6 om for every second beetle, om / 1.6 for the others.
 //! Pairs are compared after the move, and om follows the better. The min(2 n, N) best beetles move; the best
 //! n = min(N, D) have whiskers. In few dimensions most evaluations would otherwise move bad beetles. Whisker
-//! length follows sqrt(D) times the median |s|. Without progress for `patience` rounds the swarm leaps
-//! (leap.rs); if leaps bring nothing it is scattered again. `docs/bso.md` has the whole algorithm as
+//! length follows the steps, within limits (learning.rs). Without progress for `patience` rounds the swarm
+//! leaps (leap.rs); if leaps bring nothing it is scattered again. `docs/bso.md` has the whole algorithm as
 //! pseudocode, with the contribution of each part.
 //!
 //! Source: own experiments on test functions and identification problems. Taken from the beetle swarm: x, v,
 //! P, G, Eq. (19), two whiskers, the weighted move.
 //! Cost: 2 n + min(2 n, N) evaluations per round, which is an iteration where 4 n >= N; `docs/bso.md` counts
-//! the rest. Up to five square roots per direction are the only calls into `libm`.
+//! the rest. Up to six square roots per direction are the only calls into `libm`.
 //! Known limits: the search exploits fast. Only leaps and restarts search globally; a leap assumes ripples on
 //! a convex envelope. On a quadratic cost least squares is exact and
 //! instant. A noise of 1e-4 of the cost's value corrupts the last digits: the search is meant for fixed data.
@@ -32,6 +32,7 @@ use crate::real::{Real, clamp, dot, max, min, sqrt};
 use super::super::particles::{Particles, VelocityRule};
 use super::super::random::Random;
 use super::super::rows::{add_scaled, live, live_mut};
+use super::super::search::is_usable;
 use super::frame::{Frame, Reach};
 use super::leap::{Leap, leap_whisker};
 use super::metric::Metric;
@@ -61,7 +62,7 @@ pub(super) struct AdaptiveRules<T, const N: usize, const D: usize> {
     pub(super) trust: T,
     /// Smoothed share of convex readings; `None` before the first.
     pub(super) convex_share: Option<T>,
-    /// Decrease of the cost that the parabolas predict for the moves of this round.
+    /// Decrease of the cost that the parabolas predict for the steps psi of this round.
     pub(super) predicted: T,
     /// Rounds since the swarm was scattered or landed, including the current one.
     pub(super) round: u32,
@@ -251,7 +252,9 @@ impl<T: Real, const N: usize, const D: usize> Rules<T, N, D> for AdaptiveRules<T
             return;
         }
         let (psi, decrease) = self.scent(beetle, &beetles.position[beetle], dimension);
-        self.predicted += decrease;
+        if is_usable(beetles.value[beetle]) {
+            self.predicted += decrease;
+        }
         let rule = VelocityRule {
             inertia_weight: self.settings.inertia_weight,
             individual_learning: self.settings.individual_learning,
@@ -341,7 +344,10 @@ mod tests {
         for beetle in 0..N {
             let position = &beetles.position[beetle];
             let within_reach = (0..D).all(|index| (position[index] - (0.3 + 0.1 * index as f64)).abs() < 0.3);
+            let (before, predicted) = (beetles.value[beetle], rules.predicted);
             rules.displace(beetle, &mut beetles, &mut random);
+            let decrease = before - bowl(&beetles.position[beetle]);
+            assert!((rules.predicted - predicted - decrease).abs() < 1e-13, "beetle {beetle}: {decrease}");
             if within_reach {
                 // Parabolas over whiskers of 0.1 leave 1e-16 / 0.01 of rounding.
                 assert!(bowl(&beetles.position[beetle]) < 1e-24, "beetle {beetle}");
@@ -349,6 +355,35 @@ mod tests {
         }
         let best = bowl(&beetles.position[0]);
         assert!(best < 1e-24, "{best:e}");
+    }
+
+    #[test]
+    fn a_whisker_along_a_pair_knows_its_length_except_in_a_leap() {
+        let mut random = Random::new(4);
+        let mut beetles = Particles::<f64, N, D>::new(D);
+        beetles.scatter(&mut random);
+        for beetle in 0..N {
+            beetles.record(beetle, bowl(&beetles.position[beetle]));
+        }
+        let distance = |one: &[f64; D], other: &[f64; D]| {
+            sqrt((0..D).map(|index| square(one[index] - other[index])).sum::<f64>())
+        };
+        for under_way in [false, true] {
+            let settings = AdaptiveSettings { pair_directions: 2, ..AdaptiveSettings::default() };
+            let mut rules = AdaptiveRules::<f64, N, D>::new(settings, D);
+            rules.leap.under_way = under_way;
+            for beetle in 0..D {
+                rules.aim(beetle, &beetles, &mut random);
+            }
+            for (beetle, whisker) in rules.frame.whisker.iter().take(D).enumerate() {
+                let ends = &beetles.personal_best;
+                let joins_two = ends.iter().any(|one| {
+                    ends.iter().any(|other| (distance(one, other) - whisker.distance).abs() < 1e-15)
+                });
+                assert_eq!(joins_two, !under_way && (1..=2).contains(&beetle), "beetle {beetle}");
+                assert!(joins_two || whisker.distance < 0.0, "{}", whisker.distance);
+            }
+        }
     }
 
     #[test]

@@ -14,7 +14,7 @@
 //!
 //! Source: own experiments; one parabola per direction is Newton's step in the subspace of the frame.
 //! Cost: per direction two or three products with the metric (2 D^2 each) and 4 D j operations of
-//! Gram-Schmidt, repeated per draw, at most 8 draws; memory N (3 D + 6) scalars.
+//! Gram-Schmidt, repeated per draw, at most 8 draws; memory N (3 D + 7) scalars.
 
 use crate::real::{Real, abs, clamp, dot, is_finite, max, min, sign, sqrt};
 

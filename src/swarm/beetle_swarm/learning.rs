@@ -6,9 +6,10 @@
 //!   al_j  = 1 + rate gate (1 / sqrt(h_j / mean h) - 1), over its mean: stretch of A along z_j; gate is 0
 //!           up to 70 % of convex readings and 1 at 100 %, so that ripples have no effect
 //!   l     = 0.7 l + 0.3 sqrt(D) median |s_j|: whiskers as long as the usual step average ripples of its
-//!           size; at least 0.8 l; at least l where the moves gained max(3, sqrt(D)) times the predicted
-//!           decrease (a kink hides what the cost falls along), and at least 0.2 of the usual distance of two
-//!           beetles (beetles far apart sit in different ripples)
+//!           size; at least 0.8 l, and at least 0.2 of the median distance of two personal bests (beetles
+//!           far apart are in different ripples). Not shorter than before where the moves gained
+//!           max(3, sqrt(D)) times the predicted decrease: there the whiskers measure a kink. 0.8 l where
+//!           more than a third of the whiskers have no reading: they reach where the cost is not finite
 //! Symbols as in adaptive.rs and frame.rs; h_j relative to the mean of the positive ones, limited to 1/4..4.
 //!
 //! Source: own experiments. Cost: 4 D^2 min(N, D) operations, the metric's; two square roots per direction.
@@ -19,6 +20,7 @@
 use crate::real::{Real, abs, clamp, max, median, sqrt};
 
 use super::super::rows::{add_scaled, live, live_mut};
+use super::super::search::is_usable;
 use super::adaptive::AdaptiveRules;
 use super::settings::Part;
 
@@ -34,6 +36,8 @@ const LEAST_WHISKER_CHANGE: f64 = 0.8;
 /// Least whisker length, share of the median distance between two personal bests in metric coordinates:
 /// beetles far apart are in different ripples, and a whisker must average them.
 const WHISKER_PER_DISTANCE: f64 = 0.2;
+/// Share of the whiskers that must have a reading; with less the whiskers get shorter.
+const LEAST_READ: f64 = 0.65;
 /// Least ratio of gained to predicted decrease that shows a kink; sqrt(D) where that is more.
 const LEAST_KINK: f64 = 3.0;
 /// Decay per round without adaptation of the length ([`Part::WhiskerAdaptation`]).
@@ -71,13 +75,14 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     }
 
     /// True if the moves gained far more than the parabolas predicted: along a sharp ridge the whiskers
-    /// measure its kink. Whiskers sqrt(D) steps long find a ratio of sqrt(D) on a cone too, which needs no
-    /// longer whiskers.
+    /// measure its kink. On a cone, where whiskers are sqrt(D) steps long, moves gain up to sqrt(D) times the
+    /// prediction and whiskers must shrink with the steps.
     pub(super) fn is_kinked(&self, before: &[T; N], found: &[T], dimension: usize) -> bool {
-        let gained =
-            before.iter().zip(found).fold(T::zero(), |sum, (&before, &found)| sum + (before - found));
-        let ratio = max(T::from_double(LEAST_KINK), root(dimension));
-        self.predicted > T::zero() && gained > ratio * self.predicted
+        let moves =
+            before.iter().zip(found).filter(|&(&before, &found)| is_usable(before) && is_usable(found));
+        let gained = moves.fold(T::zero(), |sum, (&before, &found)| sum + (before - found));
+        let ratio = max(T::from_double(LEAST_KINK), sqrt(number(dimension)));
+        self.has(Part::Kink) && self.predicted > T::zero() && gained > ratio * self.predicted
     }
 
     /// Computes the gradient in box coordinates from the slopes along the frame: A^-T sum_j g_j z_j.
@@ -98,17 +103,19 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
     pub(super) fn learn_metric(&mut self) {
         let count = self.frame.count();
         let readings = || self.frame.whisker.iter().take(count).filter_map(|whisker| whisker.reading);
-        let (mut read, mut convex, mut curved, mut curvature) = (0_u16, 0_u16, 0_u16, T::zero());
+        let (mut read, mut convex, mut curved, mut curvature) = (0, 0, 0, T::zero());
         for reading in readings() {
             read += 1;
-            convex += u16::from(reading.convex);
+            convex += usize::from(reading.convex);
             if reading.curvature > T::zero() {
                 curved += 1;
                 curvature += reading.curvature;
             }
         }
-        let number = |count: u16| nalgebra::convert::<f32, T>(f32::from(count));
-        let share = number(convex) / nalgebra::convert(count as f32);
+        if read == 0 {
+            return;
+        }
+        let share = number::<T>(convex) / number(read);
         let share = match self.convex_share {
             None => share,
             Some(before) => smoothed(before, share),
@@ -119,7 +126,7 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         } else {
             T::one()
         };
-        if gate <= T::zero() || curved == 0 || read < 2 || !self.has(Part::Metric) {
+        if gate <= T::zero() || curved == 0 || read == 1 || !self.has(Part::Metric) {
             return;
         }
         let mean_curvature = curvature / number(curved);
@@ -146,20 +153,28 @@ impl<T: Real, const N: usize, const D: usize> AdaptiveRules<T, N, D> {
         }
     }
 
-    /// Moves the usual whisker length towards the usual step; at a kink not to a shorter one.
+    /// Moves the usual whisker length towards the usual step, at a kink not to a shorter one; shortens it
+    /// where many whiskers have no reading.
     pub(super) fn learn_whisker(&mut self, dimension: usize, is_kinked: bool) {
         if !self.has(Part::WhiskerAdaptation) {
             self.whisker = limited(T::from_double(WHISKER_DECAY) * self.whisker);
             return;
         }
-        let whiskers = || self.frame.whisker.iter().take(self.frame.count());
-        let steps = whiskers().filter_map(|whisker| whisker.reading).map(|reading| abs(reading.step));
-        let Some(step) = median_of::<T, N>(steps, 1) else { return };
+        let count = self.frame.count();
+        let whiskers = || self.frame.whisker.iter().take(count);
+        let steps = || whiskers().filter_map(|whisker| whisker.reading).map(|reading| abs(reading.step));
+        let read = number::<T>(steps().count()) / number(count);
+        let step = median_of::<T, N>(steps(), 1).filter(|_| read >= T::from_double(LEAST_READ));
+        let Some(step) = step else {
+            self.whisker = limited(T::from_double(LEAST_WHISKER_CHANGE) * self.whisker);
+            return;
+        };
         let distances = whiskers().map(|whisker| whisker.distance).filter(|&distance| distance >= T::zero());
-        let distance = median_of::<T, N>(distances, 2).unwrap_or(T::zero());
+        let distance = median_of::<T, N>(distances, 2).filter(|_| self.has(Part::Distance));
         let least_change = if is_kinked { T::one() } else { T::from_double(LEAST_WHISKER_CHANGE) };
-        let shortest = max(least_change * self.whisker, T::from_double(WHISKER_PER_DISTANCE) * distance);
-        let usual = root::<T>(dimension) * step;
+        let apart = T::from_double(WHISKER_PER_DISTANCE) * distance.unwrap_or(T::zero());
+        let shortest = max(least_change * self.whisker, apart);
+        let usual = sqrt(number::<T>(dimension)) * step;
         self.whisker = limited(max(smoothed(self.whisker, usual), shortest));
     }
 }
@@ -175,9 +190,8 @@ fn median_of<T: Real, const N: usize>(values: impl Iterator<Item = T>, least: us
     (count >= least).then(|| median(live_mut(&mut all, count)))
 }
 
-/// Square root of the number of coordinates.
-fn root<T: Real>(dimension: usize) -> T {
-    sqrt(nalgebra::convert::<f32, T>(dimension as f32))
+fn number<T: Real>(count: usize) -> T {
+    nalgebra::convert::<f32, T>(count as f32)
 }
 
 fn limited<T: Real>(whisker: T) -> T {
@@ -216,13 +230,30 @@ mod tests {
     }
 
     #[test]
-    fn whiskers_reach_a_fifth_of_the_way_to_the_other_beetles() {
-        let mut rules = measured();
-        for (whisker, distance) in rules.frame.whisker.iter_mut().zip([-1.0, 0.7, 0.0, 20.0]) {
-            whisker.distance = distance;
+    fn whiskers_get_shorter_where_more_than_a_third_has_no_reading() {
+        for (unread, expected) in [(1, 0.14), (2, 0.08), (N, 0.08)] {
+            let mut rules = measured();
+            for (index, whisker) in rules.frame.whisker.iter_mut().enumerate() {
+                whisker.distance = 0.7;
+                whisker.reading = whisker.reading.filter(|_| index >= unread);
+            }
+            rules.learn_whisker(D, true);
+            assert!(abs(rules.whisker - expected) < 1e-15, "{unread}: {}", rules.whisker);
         }
-        rules.learn_whisker(D, false);
-        assert!(abs(rules.whisker - 0.14) < 1e-15, "{}", rules.whisker);
+    }
+
+    #[test]
+    fn whiskers_reach_a_fifth_of_the_way_to_the_other_beetles() {
+        for (distances, expected) in
+            [([-1.0, 0.7, 0.0, 20.0], 0.14), ([-1.0, 0.7, -1.0, -1.0], 0.08), ([-1.0; N], 0.08)]
+        {
+            let mut rules = measured();
+            for (whisker, distance) in rules.frame.whisker.iter_mut().zip(distances) {
+                whisker.distance = distance;
+            }
+            rules.learn_whisker(D, false);
+            assert!(abs(rules.whisker - expected) < 1e-15, "{distances:?}: {}", rules.whisker);
+        }
     }
 
     #[test]
@@ -234,5 +265,14 @@ mod tests {
         assert!(rules.is_kinked(&before, &[0.0, 0.0, 1.0, 0.9], D));
         rules.predicted = -1.0;
         assert!(!rules.is_kinked(&before, &[0.0; N], D));
+    }
+
+    #[test]
+    fn values_that_are_not_finite_neither_show_nor_hide_a_kink() {
+        const NOT_FINITE: f64 = f64::MAX;
+        let mut rules = measured();
+        rules.predicted = 2.0;
+        assert!(!rules.is_kinked(&[NOT_FINITE, 2.0, 2.0, 2.0], &[0.0, 0.1, 1.0, 1.0], D));
+        assert!(rules.is_kinked(&[9.0, 2.0, 2.0, 4.0], &[NOT_FINITE, 0.0, 1.0, 0.0], D));
     }
 }

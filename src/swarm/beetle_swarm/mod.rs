@@ -14,10 +14,10 @@
 //! rounds as spend N evaluations, the cost of one move of all beetles. That is one round in the paper's mode,
 //! and in the other from five coordinates on.
 //!
-//! Memory in scalars: 3 N D swarm, 2 D^2 metric, 3 N D frame, 7 D gradient, leap, best and box, 12 N values
-//! and readings. The frame uses its first min(N, D) rows. `size_of` is 9,016 bytes for `Bso<f32, 20, 13>` and
-//! 21,560 for `Bso<f32, 20, 28>`. Stack, Cortex-M4F, D = 28: `advance` about 1.5 kB. [`Bso::new`] builds the
-//! value on the stack before the move (7 kB at opt-level 3, about 45 kB at "s").
+//! Memory in scalars: 3 N D swarm, 2 D^2 metric, 3 N D frame, 7 D gradient, leap, best and box, 11 N values
+//! and readings, and 45 words. The frame uses its first min(N, D) rows. `size_of` is 9,016 bytes for
+//! `Bso<f32, 20, 13>` and 21,560 for `Bso<f32, 20, 28>`. Stack, Cortex-M4F, D = 28: `advance` about 1.5 kB.
+//! [`Bso::new`] builds the value on the stack before the move (7 kB at opt-level 3, about 45 kB at "s").
 //! Cost: adaptive.rs, paper.rs. The longest computation between two evaluations is the end of an adaptive
 //! round, 4 D^2 min(N, D) operations (63,000 at D = 28).
 

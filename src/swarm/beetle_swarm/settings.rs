@@ -85,6 +85,10 @@ pub enum Part {
     BestMove,
     /// Whisker length that follows the steps; disabled it falls by 5 % per round.
     WhiskerAdaptation,
+    /// Whiskers that do not get shorter at a kink.
+    Kink,
+    /// Whiskers of at least a share of the distance between personal bests.
+    Distance,
     /// Newton's step along a direction; disabled it is one whisker downhill.
     Parabola,
 }

@@ -17,7 +17,7 @@
 //! than single precision resolves.
 //!
 //! Cost: an evaluation 1,200 multiplications and 11 exponentials (two joints). Memory: a `Bso` of 14 N
-//! dimensions, 21.5 kB for two joints.
+//! dimensions, 21.6 kB for two joints.
 
 use super::cost::LegCost;
 use super::limits::Limits;
