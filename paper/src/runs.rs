@@ -12,6 +12,7 @@ use scarab_identify::report::RunReport;
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Fit, JOINTS};
+use super::convergence::SETS;
 use super::load_change::LoadRun;
 use super::searches::Hits;
 use super::seeds::ReportSeed;
@@ -32,7 +33,7 @@ pub struct PaperRuns {
     /// One row.
     pub load_change: Option<RowRuns<LoadRun>>,
     /// Searches by leg and set of unknowns.
-    pub convergence: Option<RowRuns<[Option<Trial>; 4]>>,
+    pub convergence: Option<RowRuns<[Option<Trial>; SETS]>>,
 }
 
 impl PaperRuns {

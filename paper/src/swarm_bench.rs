@@ -8,7 +8,7 @@ use scarab::ident::{
     Record, SearchState, Solver, least_squares_in_box,
 };
 use scarab::model::{LegParameters, PARAMETERS_PER_JOINT};
-use scarab::swarm::{Bso, BsoSettings, Objective, Search};
+use scarab::swarm::{Bso, BsoSettings, Objective, Pso, PsoSettings, Search, SwarmError};
 use scarab_base::error::ToolError;
 use scarab_base::words::exact;
 use scarab_identify::run::consistent;
@@ -20,10 +20,12 @@ use super::seen_links::SeenLinks;
 
 /// A search has reached the optimum if J exceeds J_opt by less than this share of it.
 pub const SHARE: f64 = 1e-3;
-/// Limit of a search.
-const MOST_ITERATIONS: u32 = 400;
+/// Limit of a search: 400 iterations of the default swarm with 20 unknowns or more.
+const MOST_EVALUATIONS: u32 = 24_000;
 /// Capacity for all parameters of three joints.
 const DIMENSIONS: usize = 42;
+
+type Beetles = Bso<f32, 20, DIMENSIONS>;
 
 /// Result of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -101,35 +103,43 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
                     return trial;
                 }
             }
-            if ended || seen >= MOST_ITERATIONS {
+            if ended || search.evaluations() >= MOST_EVALUATIONS {
                 return trial;
             }
         }
     }
 
-    /// Searches every parameter with an effect on torque, each in its own range.
-    pub fn raw(&self) -> Trial {
+    /// Searches every parameter with an effect on torque, each in its own range: by the default swarm, by
+    /// the paper's rules with (29) corrected, and by a particle swarm, which (29) is as printed.
+    pub fn raw(&self) -> [Trial; 3] {
         let model = &self.context.background.device;
-        let Some(prior) = self.context.configuration.prior.as_ref() else { return Trial::new(0) };
+        let Some(prior) = self.context.configuration.prior.as_ref() else { return [Trial::new(0); 3] };
         let problem = Problem::new(self.solver.record(), model);
         let objective = RawCost::new(model, problem.whole(), prior);
         let above = self.raw_optimum(&objective);
-        self.searched(&objective, above, |position| objective.base(position))
+        let values = |position: &[f32]| objective.base(position);
+        let beetles = |settings| {
+            self.searched(&objective, above, values, Beetles::new(&objective, settings, self.seed))
+        };
+        let particles = Pso::<f32, 20, DIMENSIONS>::new(&objective, PsoSettings::default(), self.seed);
+        [
+            beetles(BsoSettings::default()),
+            beetles(BsoSettings::paper()),
+            self.searched(&objective, above, values, particles),
+        ]
     }
 
-    /// Runs the swarm alone until the base values of its best reach the optimum.
+    /// Runs a search alone until the base values of its best reach the optimum.
     fn searched(
         &self,
         objective: &impl Objective<f32>,
         above: f64,
         values: impl Fn(&[f32]) -> [f32; B],
+        swarm: Result<impl Search<f32>, SwarmError>,
     ) -> Trial {
         let mut trial = Trial::new(objective.dimension());
-        let Ok(mut swarm) = Bso::<f32, 20, DIMENSIONS>::new(objective, BsoSettings::default(), self.seed)
-        else {
-            return trial;
-        };
-        while swarm.iterations() < MOST_ITERATIONS {
+        let Ok(mut swarm) = swarm else { return trial };
+        while swarm.evaluations() < MOST_EVALUATIONS {
             let before = swarm.iterations();
             while swarm.iterations() == before {
                 if swarm.advance(objective, 1) == 0 {
@@ -187,7 +197,8 @@ impl<'a, const N: usize, const B: usize> Bench<'a, N, B> {
         cost.fill(model, &problem.whole(), &values, Effort::device(true).pull);
         let objective = FullObjective::new(&limits, &cost);
         let seen = SeenLinks::new(&objective, &background.model.base).map(|seen| {
-            self.searched(&seen, above, |position| model.base.project(&seen.parameters(position)))
+            let swarm = Beetles::new(&seen, BsoSettings::default(), self.seed);
+            self.searched(&seen, above, |position| model.base.project(&seen.parameters(position)), swarm)
         });
         (self.whole_leg(&objective, above), seen)
     }
