@@ -18,7 +18,7 @@
 //! Source: Hansen et al., Real-Parameter Black-Box Optimization Benchmarking 2009: Noiseless Functions
 //! Definitions; some of its transforms are left out.
 
-use scarab::real::{exp, ln, sqrt};
+use scarab::real::{Real, exp, ln, sqrt};
 use scarab::swarm::{
     AdaptiveSettings, Bso, BsoSettings, Objective, Random, Search, SwarmError, TestFunction, TestProblem,
 };
@@ -65,17 +65,17 @@ impl Instance {
     }
 
     /// Evaluations until the swarm comes within `goal` of the minimum; `None` within 2,000 per dimension.
-    pub fn evaluations(
+    pub fn evaluations<T: Real>(
         &self,
-        settings: AdaptiveSettings<f64>,
+        settings: AdaptiveSettings<T>,
         goal: f64,
         seed: u64,
     ) -> Result<Option<u32>, SwarmError> {
-        let mut swarm = Box::new(Bso::<f64, 20, 30>::new(self, BsoSettings::Adaptive(settings), seed)?);
+        let mut swarm = Box::new(Bso::<T, 20, 30>::new(self, BsoSettings::Adaptive(settings), seed)?);
         let most = EVALUATIONS_PER_DIMENSION * self.minimiser.len() as u32;
         while swarm.evaluations() < most {
             swarm.advance(self, 1);
-            if swarm.best().is_some_and(|best| best.value - self.constant <= self.factor * goal) {
+            if swarm.best().is_some_and(|best| best.value.to_double() - self.constant <= self.factor * goal) {
                 return Ok(Some(swarm.evaluations()));
             }
         }
@@ -111,17 +111,18 @@ impl Instance {
     }
 }
 
-impl Objective<f64> for Instance {
+impl<T: Real> Objective<T> for Instance {
     fn dimension(&self) -> usize {
         self.minimiser.len()
     }
 
-    fn bounds(&self, _: usize) -> (f64, f64) {
-        (-HALF_WIDTH, HALF_WIDTH)
+    fn bounds(&self, _: usize) -> (T, T) {
+        (T::from_double(-HALF_WIDTH), T::from_double(HALF_WIDTH))
     }
 
-    fn evaluate(&self, position: &[f64]) -> f64 {
-        self.factor * self.cost(position) + self.constant
+    fn evaluate(&self, position: &[T]) -> T {
+        let position: Vec<f64> = position.iter().map(|x| x.to_double()).collect();
+        T::from_double(self.factor * self.cost(&position) + self.constant)
     }
 }
 

@@ -89,7 +89,7 @@ fn settings() -> BTreeMap<String, f64> {
 #[test]
 fn the_document_lists_every_constant_of_the_default_swarm() {
     let mut code = constants();
-    assert_eq!(code.len(), 32, "{:?}", code.keys());
+    assert_eq!(code.len(), 33, "{:?}", code.keys());
     code.extend(settings());
     assert_eq!(documented(), code);
 }

@@ -27,8 +27,6 @@ use super::metric::Metric;
 const DRAWS: u32 = 8;
 /// Least share of a direction outside the frame; with less it is drawn again.
 const LEAST_REMAINDER: f64 = 1e-2;
-/// Least length of a vector with a direction.
-const LEAST_LENGTH: f64 = 1e-18;
 /// Curvature above minus so many roundings of f over l^2 counts as convex.
 const CURVATURE_ROUNDINGS: f64 = 8.0;
 
@@ -178,7 +176,10 @@ impl<T: Real, const N: usize, const D: usize> Frame<T, N, D> {
     /// where too little remains.
     fn complement(&self, index: usize, mut candidate: [T; D]) -> Option<[T; D]> {
         let rest = live_mut(&mut candidate, self.dimension);
-        if !normalise(rest, T::from_double(LEAST_LENGTH)) {
+        // The unit of the cost, which a gradient contains, must not let its square underflow or overflow.
+        let largest = rest.iter().fold(T::zero(), |most, &entry| max(most, abs(entry)));
+        scale(rest, T::one() / largest);
+        if !normalise(rest, T::one()) {
             return None;
         }
         for earlier in self.direction.iter().take(index) {

@@ -27,9 +27,12 @@ use super::settings::Part;
 /// Least trust in other beetles' whiskers, and its change per compared pair.
 const LEAST_TRUST: f64 = 0.02;
 const TRUST_CHANGE: f64 = 0.1;
-/// Longest usual whisker, metric coordinates. The shortest is the root of the type's rounding: near a value
-/// of 1 a shorter one measures rounding only.
+/// Longest usual whisker, metric coordinates.
 const LONGEST_WHISKER: f64 = 0.3;
+/// Shortest usual whisker, metric coordinates, and its least number of roundings. In single precision a
+/// longer one leaves narrow valleys: in the box it is up to [`LONGEST_AXIS`] times as long.
+const SHORTEST_WHISKER: f64 = 1e-8;
+const WHISKER_ROUNDINGS: f64 = 32.0;
 /// Least ratio of the usual whisker length to that of the round before: the metric of a cost with a sharp
 /// ridge needs time to turn to the ridge.
 const LEAST_WHISKER_CHANGE: f64 = 0.8;
@@ -195,7 +198,8 @@ fn number<T: Real>(count: usize) -> T {
 }
 
 fn limited<T: Real>(whisker: T) -> T {
-    clamp(whisker, sqrt(T::EPSILON), T::from_double(LONGEST_WHISKER))
+    let roundings = T::from_double(WHISKER_ROUNDINGS) * T::EPSILON;
+    clamp(whisker, max(T::from_double(SHORTEST_WHISKER), roundings), T::from_double(LONGEST_WHISKER))
 }
 
 fn smoothed<T: Real>(before: T, now: T) -> T {
