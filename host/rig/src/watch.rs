@@ -362,10 +362,11 @@ impl<'a, const N: usize, const B: usize> Watch<'a, N, B> {
         let (training, validation) = self.motions(model, found.record(), unused, &carrying);
         let (cramer_rao, surplus_cramer_rao) =
             self.information.without(&found.record().selection.dropped).bounds();
+        let is_noisy = self.context.noise.iter().all(|&noise| noise > 0.0);
         let circumstances = Circumstances {
             seed: Some(options.seed),
-            cramer_rao: Some(cramer_rao),
-            surplus_cramer_rao: surplus_cramer_rao.to_vec(),
+            cramer_rao: is_noisy.then_some(cramer_rao),
+            surplus_cramer_rao: surplus_cramer_rao.map(|bound| bound.filter(|_| is_noisy)).to_vec(),
             estimator: options.estimator,
             iterations_to_half_chi2: match &corrected {
                 Some(run) => run.iterations_to_half_chi2,

@@ -115,8 +115,7 @@ fn sentence(evidence: &Evidence<f32>, motion: &str) -> String {
         Test::Torque => format!("the torque of joint {joint} is always zero"),
         Test::Search if value.abs() < 1e30 => format!(
             "the search has not converged: it ended {value:.2} chi-square units above least squares, limit {limit:.2}; \
-             try another --swarm-seed; a simulated leg also needs noise of its torque (--torque-noise 1), because single \
-             precision cannot resolve less"
+             try another --swarm-seed"
         ),
         Test::Search => "the search did not finish".into(),
         Test::Drive => "the drive stopped during the identification".into(),

@@ -102,11 +102,12 @@ fn hidden(runs: &[RunReport]) -> Result<(), ToolError> {
     Ok(())
 }
 
-/// Table of the errors relative to the bound, for each base parameter.
+/// Table of the errors for each base parameter; torque without noise has no bound.
 fn spread_table(report: &RunsReport) -> Table {
     let mut table = Table::default().label("base parameter").numbers([
         "truth",
         "rms sigma",
+        "rms error",
         "bso rmse / CRB",
         "ls rmse / CRB",
         "bso bias / CRB",
@@ -122,23 +123,27 @@ fn spread_table(report: &RunsReport) -> Table {
         |run: &RunReport, name: &str| run.base_parameters.iter().find(|base| base.name == name).cloned();
     let first = |name: &&String| report.runs.iter().find_map(|run| named(run, name));
     for base in seen.iter().filter_map(first) {
-        let (Some(truth), Some(bound)) = (base.truth.known(), base.cramer_rao.known()) else { continue };
+        let Some(truth) = base.truth.known() else { continue };
         let of = |value: &dyn Fn(&RunReport) -> Option<f64>| -> Vec<f64> {
             report.runs.iter().filter_map(value).collect()
         };
         let swarm = of(&|run| named(run, &base.name)?.value.known());
         let squares = of(&|run| run.least_squares.base_parameters.get(&base.name)?.known());
         let sigma = of(&|run| named(run, &base.name)?.sigma.known());
-        let bounds = rms(of(&|run| named(run, &base.name)?.cramer_rao.known()));
-        let bound = if bounds > 0.0 { bounds } else { bound };
+        let bound = rms(of(&|run| named(run, &base.name)?.cramer_rao.known()));
+        let over_bound = |error: f64| {
+            if bound > 0.0 { format!("{:.2}", error / bound) } else { "-".to_owned() }
+        };
+        let error = rms(swarm.iter().map(|value| value - truth));
         let bias = swarm.iter().map(|value| value - truth).sum::<f64>() / swarm.len().max(1) as f64;
         table.row(cells![
             &base.name,
             number(truth.into()),
             number(rms(sigma).into()),
-            format!("{:.2}", rms(swarm.iter().map(|value| value - truth)) / bound),
-            format!("{:.2}", rms(squares.iter().map(|value| value - truth)) / bound),
-            format!("{:+.2}", bias / bound),
+            number(error.into()),
+            over_bound(error),
+            over_bound(rms(squares.iter().map(|value| value - truth))),
+            over_bound(bias),
         ]);
     }
     table

@@ -185,7 +185,10 @@ fn the_check_of_a_robot_offers_its_prior_as_truth() {
     assert_contains(&report, "    truth = { mass = 5.0, com = [0.2, 0.0, 0.0]");
     assert_contains(&report, "    # within `prior = { .. }`: rotor_inertia = KG_M2\n");
     let report = paste(&folder, "leg.toml", "simulation");
-    assert_contains(&report, "\nsimulation: ready\n  its torque has no noise: add --torque-noise 1");
+    assert_contains(
+        &report,
+        "\nsimulation: ready\n  its torque has no noise, unlike a real one: --torque-noise 7",
+    );
     for (leg, words) in
         [("none.toml", "cannot be read"), ("sp", "image: not possible: an image supports two joints")]
     {

@@ -72,9 +72,7 @@ fn simulation(text: &mut String, leg: &LegFile, known: &Result<(), FileError>) {
                 section(text, "simulation", "ready");
                 let is_noiseless = leg.joints.iter().all(|joint| joint.current_noise_a == 0.0);
                 if leg.torque_noise_percent == 0.0 && is_noiseless {
-                    text.push_str(
-                        "  its torque has no noise: add --torque-noise 1, or `torque_noise_percent`\n",
-                    );
+                    text.push_str("  its torque has no noise, unlike a real one: --torque-noise 7\n");
                 }
             }
             Err(fault) => impossible(text, "simulation", &fault),
