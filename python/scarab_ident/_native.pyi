@@ -295,13 +295,17 @@ def read_recording(
     columns: str = "",
     units: str = "",
     skip_bad: bool = False,
-    delimiter: Literal["comma", "semicolon", "tab"] | None = None,
+    rate_hz: float | None = None,
+    merge_rows: bool = False,
+    even_stamps: bool = False,
+    delimiter: Literal["comma", "semicolon", "tab", "space"] | None = None,
     decimal: Literal["point", "comma"] | None = None,
 ) -> Recording:
     """Reads a CSV recording (also .csv.gz), as `cargo sim replay` does.
 
     `columns`: 't=time,q1=position_0,tau1=4'; `units`: 'ms,deg,tau2=mNm'. Nothing is converted unless stated.
-    `skip_bad` skips invalid rows, at most 5 %, with a warning. Other formats: `pandas`, then arrays.
+    `skip_bad` skips invalid rows, at most 5 %, with a warning. `rate_hz` reads rows without times, `merge_rows`
+    rows that hold some of the signals each; `even_stamps` replaces the times. Other formats: `pandas`, then arrays.
     """
 
 def beetle_swarm(

@@ -18,9 +18,10 @@ create_exception!(
 );
 
 /// Options whose argument has another name; `--even-stamps` becomes `even_stamps` without an entry.
-const ARGUMENTS: [(&str, &str); 8] = [
+const ARGUMENTS: [(&str, &str); 9] = [
     ("--torque-delay", "torque_delay_ms"),
     ("--bandwidth", "bandwidth_hz"),
+    ("--rate", "rate_hz"),
     ("--accept-error", "accept_error_percent"),
     ("--duration", "duration_s"),
     ("--torque-margin", "torque_margin_percent"),

@@ -87,7 +87,7 @@ pub fn warn(py: Python<'_>, warnings: impl IntoIterator<Item = String>) -> PyRes
 
 #[doc = include_str!(concat!(env!("OUT_DIR"), "/read_recording"))]
 #[pyfunction]
-#[pyo3(signature = (path, leg, *, columns = "", units = "", skip_bad = false, delimiter = None, decimal = None))]
+#[pyo3(signature = (path, leg, *, columns = "", units = "", skip_bad = false, rate_hz = None, merge_rows = false, even_stamps = false, delimiter = None, decimal = None))]
 pub fn read_recording<'py>(
     py: Python<'py>,
     path: PathBuf,
@@ -95,16 +95,26 @@ pub fn read_recording<'py>(
     columns: &str,
     units: &str,
     skip_bad: bool,
+    rate_hz: Option<f64>,
+    merge_rows: bool,
+    even_stamps: bool,
     delimiter: Option<&str>,
     decimal: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let columns: Vec<ColumnChoice> = parts("columns", columns)?;
     let units: Vec<UnitChoice> = parts("units", units)?;
-    let delimiters =
-        [("comma", Delimiter::Comma), ("semicolon", Delimiter::Semicolon), ("tab", Delimiter::Tab)];
+    let delimiters = [
+        ("comma", Delimiter::Comma),
+        ("semicolon", Delimiter::Semicolon),
+        ("tab", Delimiter::Tab),
+        ("space", Delimiter::Space),
+    ];
     let decimals = [("point", Decimal::Point), ("comma", Decimal::Comma)];
     let import = Import {
         skip_bad,
+        rate_hz,
+        merge_rows,
+        even_stamps,
         delimiter: delimiter.map(|name| named("delimiter", name, &delimiters)).transpose()?,
         decimal: decimal.map(|name| named("decimal", name, &decimals)).transpose()?,
         command: format!("scarab replay {}", path.display()),

@@ -35,6 +35,7 @@ mod fault;
 mod foreign;
 pub mod import;
 mod lines;
+mod merged;
 pub(crate) mod signal;
 pub(crate) mod source;
 pub(crate) mod suggest;
@@ -153,6 +154,13 @@ impl Recording {
     /// Median time between two samples, s; zero for fewer than two samples.
     pub(crate) fn median_step_s(&self) -> f64 {
         median_step_s(&self.time_s)
+    }
+
+    /// Replaces the time stamps by an even clock from the first to the last.
+    pub(crate) fn even_stamps(&mut self) {
+        let first = self.time_s.first().copied().unwrap_or(0.0);
+        let step = self.duration_s() / (self.time_s.len().max(2) - 1) as f64;
+        self.time_s.iter_mut().enumerate().for_each(|(sample, time)| *time = first + step * sample as f64);
     }
 
     /// Splits at a fraction (0 to 1) of the duration; fails if a part is too short for a recording.

@@ -205,7 +205,9 @@ impl Task {
             match word {
                 "--split" => options.split = Some(number(value())?),
                 "--accept-error" => options.accept_error_percent = number(value())?,
-                "--even-stamps" => options.even_stamps = true,
+                "--even-stamps" => (options.even_stamps, import.even_stamps) = (true, true),
+                "--merge-rows" => import.merge_rows = true,
+                "--rate" => import.rate_hz = Some(number(value())?),
                 "--skip-bad" => import.skip_bad = true,
                 "--bandwidth" => match value() {
                     "auto" => options.chooses_bandwidth = true,

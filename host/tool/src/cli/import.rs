@@ -24,6 +24,15 @@ pub(crate) struct ImportArguments {
     /// Skip rows that are invalid, at most 5 % of a file; they are counted and reported.
     #[arg(long, help_heading = "Recordings")]
     skip_bad: bool,
+    /// Rate of the rows of files without a column of time, Hz.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, help_heading = "Recordings")]
+    rate: Option<f64>,
+    /// Join rows that hold some of the signals each, as loggers of messages write them, by time.
+    #[arg(long, conflicts_with = "rate", help_heading = "Recordings")]
+    merge_rows: bool,
+    /// Replace the time stamps by an even clock from the first to the last.
+    #[arg(long, help_heading = "Recordings")]
+    even_stamps: bool,
     /// Separator of fields, where the first lines allow two.
     #[arg(long, value_parser = one_of(DELIMITERS), help_heading = "Recordings")]
     delimiter: Option<Delimiter>,
@@ -32,8 +41,12 @@ pub(crate) struct ImportArguments {
     decimal: Option<Decimal>,
 }
 
-const DELIMITERS: &[Choice<Delimiter>] =
-    &[("comma", Delimiter::Comma, ""), ("semicolon", Delimiter::Semicolon, ""), ("tab", Delimiter::Tab, "")];
+const DELIMITERS: &[Choice<Delimiter>] = &[
+    ("comma", Delimiter::Comma, ""),
+    ("semicolon", Delimiter::Semicolon, ""),
+    ("tab", Delimiter::Tab, ""),
+    ("space", Delimiter::Space, ""),
+];
 
 const DECIMALS: &[Choice<Decimal>] = &[("point", Decimal::Point, ""), ("comma", Decimal::Comma, "")];
 
@@ -43,6 +56,9 @@ impl ImportArguments {
         let (text, _) = LegFile::text(name)?;
         let import = Import {
             skip_bad: self.skip_bad,
+            rate_hz: self.rate,
+            merge_rows: self.merge_rows,
+            even_stamps: self.even_stamps,
             delimiter: self.delimiter,
             decimal: self.decimal,
             command: command(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),

@@ -54,9 +54,6 @@ pub(crate) struct ReplayArguments {
         help_heading = "Identification"
     )]
     torque_delay: Vec<f64>,
-    /// Replace the time stamps by an even clock from the first to the last.
-    #[arg(long, help_heading = "Identification")]
-    even_stamps: bool,
     /// Known mass that the leg carries in every recording, KG@JOINT:X_M[:Y_M]. The parameters are those of
     /// the leg without it.
     #[arg(long, help_heading = "Recordings")]
@@ -114,7 +111,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<u8, ToolError> {
         swarm_seed: arguments.common.swarm_seed.unwrap_or(DEFAULT_SEED),
         csv: arguments.csv.as_deref().map(Path::to_owned),
         torque_delay_ms: arguments.torque_delay.clone(),
-        even_stamps: arguments.even_stamps,
+        even_stamps: import.even_stamps,
         load: arguments.load.as_ref().map(|mass| mass.on(leg, "--load")).transpose()?,
         payload: arguments.payload.as_ref().map(|mass| mass.on(leg, "--payload")).transpose()?,
         import: Some(import.clone()),

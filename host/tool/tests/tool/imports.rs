@@ -160,6 +160,100 @@ fn times_in_another_unit_are_refused_with_the_complete_command() {
 }
 
 #[test]
+fn fields_between_any_number_of_spaces_are_read() {
+    let spaced = |[time, angle, torque]: [f64; 3]| format!("  {time}   {angle} {torque}");
+    let named = text("t_s  q1_rad  tau1_Nm\n", spaced);
+    assert_restored(&read(&named, &import("", "")).expect("a header of words").recording);
+    let numbers = text("", |values| spaced(values).replace('.', ","));
+    let numbered = import("t=1,q1=2,tau1=3", "");
+    let read = read(&numbers, &numbered).expect("numbers with decimal commas");
+    assert_eq!(read.report.format, "CSV with spaces, decimal commas");
+    assert_restored(&read.recording);
+}
+
+#[test]
+fn rows_without_times_are_read_at_a_stated_rate() {
+    let untimed = |[_, angle, torque]: [f64; 3]| format!("{angle},{torque}");
+    for (header, columns) in [("pos,effort\n", "q1=pos,tau1=effort"), ("", "q1=1,tau1=2")] {
+        let text = text(header, untimed);
+        let message = refusal(&text, &import("", ""));
+        let words = if header.is_empty() { "If only the time is missing" } else { "has no column of time" };
+        assert_contains(&message, words);
+        assert!(
+            message
+                .lines()
+                .any(|line| line.ends_with(&format!("--columns {columns} --units rad,Nm --rate HZ"))),
+            "{message}"
+        );
+        let stated = Import { rate_hz: Some(64.0), ..import(columns, "") };
+        assert_restored(&read(&text, &stated).expect("a rate").recording);
+        // A skipped row leaves its time out.
+        let damaged = text.replacen('\n', "\n-,-\n", 2);
+        let skipping = Import { skip_bad: true, ..stated };
+        let recording = read(&damaged, &skipping).expect("two damaged rows").recording;
+        assert!(recording.duration_s() > 199.0 / 64.0, "{header}");
+    }
+    let timed = text("t_s,q1_rad,tau1_Nm\n", plain);
+    let stated = Import { rate_hz: Some(64.0), ..import("", "") };
+    assert_contains(&refusal(&timed, &stated), "the file has the column of time `t_s`: leave out --rate");
+    for rate in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let stated = Import { rate_hz: Some(rate), ..Import::plain(1) };
+        assert!(stated.with(&[], &[]).is_err(), "{rate}");
+    }
+}
+
+#[test]
+fn messages_in_rows_of_their_own_are_joined_by_time() {
+    // The torque is sent a third of a sample later.
+    let line = |time: f64| 1.0 + 0.25 * time;
+    let separate = text("t_s,q1_rad,tau1_Nm\n", |[time, angle, _]| {
+        format!("{time},{angle},\n{},,{}", time + 1.0 / 192.0, line(time + 1.0 / 192.0))
+    });
+    let message = refusal(&separate, &import("", ""));
+    assert_contains(&message, "angles and torques are in different rows");
+    assert_contains(&message, "--merge-rows");
+    let merging = Import { merge_rows: true, ..import("", "") };
+    let read = read(&separate, &merging).expect("every signal is there").recording;
+    // Before the first torque nothing is known.
+    assert_eq!(read.time_s.len(), 199);
+    for (index, (time, torque)) in read.time_s.iter().zip(&read.joints[0].torque_nm).enumerate() {
+        let [at, angle, _] = sample(index as u32 + 1);
+        assert_eq!((*time, read.joints[0].position_rad[index]), (at, angle));
+        assert!((torque - line(at)).abs() < 1e-12, "{at}");
+    }
+    // One joint's torque is lost for a second: a gap.
+    let holed: Vec<&str> = separate
+        .lines()
+        .enumerate()
+        .filter(|(row, _)| !(101..230).contains(row) || row % 2 == 1)
+        .map(|(_, line)| line)
+        .collect();
+    assert_contains(&refusal(&holed.join("\n"), &merging), "without a sample before this line");
+}
+
+#[test]
+fn repeated_rows_and_rounded_stamps_are_named_with_their_option() {
+    let twice = text("t_s,q1_rad,tau1_Nm\n", |values| format!("{0}\n{0}", plain(values)));
+    assert_eq!(
+        refusal(&twice, &import("", "")),
+        "walk.csv:3: the row repeats the one before it; --skip-bad keeps one of repeated rows"
+    );
+    let skipping = Import { skip_bad: true, ..import("", "") };
+    let kept = read(&twice, &skipping).expect("one of each");
+    assert_eq!(kept.report.skipped, 200);
+    assert_restored(&kept.recording);
+    let rounded = text("t_s,q1_rad,tau1_Nm\n", |[time, angle, torque]| {
+        format!("{:.2},{angle},{torque}", (20.0 * time).floor() / 20.0)
+    });
+    assert_contains(&refusal(&rounded, &import("", "")), "--even-stamps");
+    let even = Import { even_stamps: true, ..import("", "") };
+    let recording = read(&rounded, &even).expect("an even clock").recording;
+    assert_eq!(recording.time_s.len(), 200);
+    let steps: Vec<f64> = recording.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(steps.iter().all(|step| (step - 3.1 / 199.0).abs() < 1e-12), "{steps:?}");
+}
+
+#[test]
 fn one_column_for_two_signals_is_refused() {
     let text = text("t,a,b\n", plain);
     for columns in ["t=t,q1=a,tau1=a", "t=t,q1=2,tau1=a", "t=1,q1=2,tau1=2"] {
@@ -284,7 +378,10 @@ fn a_file_with_too_few_columns_names_how_many_the_leg_needs() {
     let message = refusal("t_s,q1_rad,q2_rad,tau1_Nm\n0,0,0,4\n", &Import::plain(2));
     assert!(message.ends_with(&format!("No name resembles tau2. {too_few}")), "{message}");
     let message = refusal("0,0,0,4\n", &Import::plain(2));
-    assert!(message.ends_with(&format!("its first row has 4 numbers (0, 0, 0, 4). {too_few}")), "{message}");
+    assert_contains(
+        &message,
+        &format!("its first row has 4 numbers (0, 0, 0, 4). {too_few}. If only the time"),
+    );
 }
 
 #[test]

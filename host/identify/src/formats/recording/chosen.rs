@@ -8,8 +8,7 @@ use crate::formats::recording::fault::Fault;
 use crate::formats::recording::import::{ColumnName, Import};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
 use crate::formats::recording::suggest::{
-    Reading, advice, by_number, choices_of_joint, command, documented, nearest, readings, required,
-    unit_in_name,
+    Reading, advice, choices_of_joint, command, documented, nearest, readings, unit_in_name, without_header,
 };
 use crate::formats::recording::{LARGEST_POSITION_RAD, LARGEST_TIME_S, LARGEST_TORQUE_NM};
 use crate::report::reading::ColumnReport;
@@ -98,7 +97,10 @@ pub(crate) fn choose(names: &Names, import: &Import) -> Result<(Vec<Chosen>, usi
     let mut found = BTreeMap::new();
     let mut missing = None;
     let mut order = Vec::new();
-    for choices in required(joints) {
+    if import.rate_hz.is_some() && finder.has_documented(&[Signal::Time]) {
+        return Err(Fault::RateAndTime(Signal::Time.column(import.unit(Signal::Time).0)));
+    }
+    for choices in import.required() {
         match finder.find(&choices)? {
             Some((signal, column)) => {
                 found.insert(signal, column);
@@ -250,7 +252,7 @@ impl Finder<'_> {
         Fault::NoHeader {
             first: self.names.names.join(", "),
             columns: self.names.names.len(),
-            advice: by_number(self.names.names.len(), self.import),
+            advice: without_header(self.names.names.len(), self.import),
         }
     }
 

@@ -23,7 +23,7 @@ impl<R: BufRead> Rows<R> {
             .flexible(true)
             .trim(csv::Trim::All)
             .delimiter(delimiter.byte())
-            .from_reader(Lines::new(source));
+            .from_reader(Lines::new(source, delimiter == Delimiter::Space));
         Self { reader, row: StringRecord::new() }
     }
 

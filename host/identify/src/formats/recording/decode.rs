@@ -9,9 +9,10 @@ use scarab_base::error::FileError;
 
 use crate::formats::recording::chosen::{Chosen, Names, choose};
 use crate::formats::recording::columns::{LineNumbers, Rows, peeked, refuse};
-use crate::formats::recording::dialect::{Decimal, Dialect, LOOKED_AT};
+use crate::formats::recording::dialect::{Decimal, Dialect, LOOKED_AT, first_rows};
 use crate::formats::recording::fault::{Fault, rounded};
 use crate::formats::recording::import::{ColumnName, Import};
+use crate::formats::recording::merged::{check_scattered, joined};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
 use crate::formats::recording::suggest::{Reading, command, documented};
 use crate::formats::recording::{
@@ -21,7 +22,7 @@ use crate::formats::recording::{
 use crate::report::reading::{ARRAYS, ReadReport, SkippedReport};
 
 /// Rate above which the unit of the time is in doubt, Hz.
-const LARGEST_RATE_HZ: f64 = 5e4;
+pub(crate) const LARGEST_RATE_HZ: f64 = 5e4;
 
 /// Recording with its provenance.
 #[derive(Clone, Debug)]
@@ -39,6 +40,8 @@ pub(crate) struct Decoder<'a> {
     /// Line of every sample.
     numbers: LineNumbers,
     skipped: Skipped,
+    /// Rows so far.
+    rows: usize,
     /// First row with its line and time, where that time is out of range: the next row shows its unit.
     suspect: Option<(usize, f64)>,
     /// Values of the current row.
@@ -57,7 +60,7 @@ impl<'a> Decoder<'a> {
             joints_in_file,
         };
         let (numbers, skipped, values) = (LineNumbers::default(), Skipped::default(), Vec::new());
-        Ok(Self { file, import, columns, recording, numbers, skipped, suspect: None, values })
+        Ok(Self { file, import, columns, recording, numbers, skipped, rows: 0, suspect: None, values })
     }
 
     /// Indices of the chosen columns, in the order in which [`Decoder::take`] asks for their numbers.
@@ -75,13 +78,14 @@ impl<'a> Decoder<'a> {
         line: usize,
         number: impl FnMut(&Chosen) -> Result<f64, Fault>,
     ) -> Result<(), FileError> {
+        self.rows += 1;
         match self.push(number) {
             Ok(()) => {
                 self.settle(None)?;
                 self.numbers.push(line);
                 Ok(())
             }
-            Err(Fault::Absurd { column, value, limit, .. }) if column == self.columns[0].column.name => {
+            Err(Fault::Absurd { column, value, limit, .. }) if self.is_time(&column) => {
                 let is_first = self.recording.time_s.is_empty() && self.skipped.rows == 0;
                 if is_first && self.suspect.is_none() {
                     self.suspect = Some((line, value));
@@ -89,11 +93,11 @@ impl<'a> Decoder<'a> {
                 }
                 self.settle(Some(value))?;
                 let advice = self.time_advice(&self.recording.time_s);
-                self.skip(line, Fault::Absurd { column, value, limit, advice })
+                self.skip_taken(line, Fault::Absurd { column, value, limit, advice })
             }
             Err(fault) => {
                 self.settle(None)?;
-                self.skip(line, fault)
+                self.skip_taken(line, fault)
             }
         }
     }
@@ -104,7 +108,11 @@ impl<'a> Decoder<'a> {
         let time = &self.columns[0];
         let advice = next.map_or(String::new(), |next| self.time_advice(&[time.si(value), time.si(next)]));
         let (column, limit) = (time.column.name.clone(), time.largest());
-        self.skip(line, Fault::Absurd { column, value, limit, advice })
+        self.skip_taken(line, Fault::Absurd { column, value, limit, advice })
+    }
+
+    fn is_time(&self, column: &str) -> bool {
+        self.columns.first().is_some_and(|first| first.signal == Signal::Time && first.column.name == column)
     }
 
     /// Advice on the unit of these times, s.
@@ -117,9 +125,17 @@ impl<'a> Decoder<'a> {
     /// # Errors
     /// The fault, where rows are not skipped.
     pub(crate) fn skip(&mut self, line: usize, fault: Fault) -> Result<(), FileError> {
+        self.rows += 1;
+        self.skip_taken(line, fault)
+    }
+
+    fn skip_taken(&mut self, line: usize, fault: Fault) -> Result<(), FileError> {
         if !self.import.skip_bad || !fault.is_of_row() || fault.is_of_unit() {
             // A fault of the first row is rather one of all rows.
-            let is_damage = fault.is_of_row() && !fault.is_of_unit() && !self.recording.time_s.is_empty();
+            let is_damage = fault.is_of_row()
+                && !fault.is_of_unit()
+                && !matches!(fault, Fault::Repeated)
+                && !self.recording.time_s.is_empty();
             let fault = if is_damage { Fault::Skippable(Box::new(fault)) } else { fault };
             return Err(refuse(self.file, Some(line), fault));
         }
@@ -132,6 +148,8 @@ impl<'a> Decoder<'a> {
             return Err(Fault::TooManySamples);
         }
         self.values.clear();
+        self.values.extend(self.import.rate_hz.map(|rate| (self.rows - 1) as f64 / rate));
+        let mut same_time = None;
         for column in &self.columns {
             let value = column.value(number(column)?)?;
             self.values.push(value);
@@ -139,8 +157,19 @@ impl<'a> Decoder<'a> {
             if let ([time], Some(&previous)) = (&self.values[..], self.recording.time_s.last())
                 && *time <= previous
             {
-                return Err(Fault::TimeNotIncreasing { previous, time: *time });
+                same_time = Some(*time).filter(|time| *time == previous);
+                if same_time.is_none() {
+                    return Err(Fault::TimeNotIncreasing { previous, time: *time });
+                }
             }
+        }
+        if let Some(time) = same_time.filter(|_| !self.import.even_stamps) {
+            let is_repeated =
+                self.recording.joints.iter().zip(self.values[1..].chunks_exact(2)).all(|(joint, pair)| {
+                    joint.position_rad.last() == pair.first() && joint.torque_nm.last() == pair.last()
+                });
+            let fault = Fault::TimeNotIncreasing { previous: time, time };
+            return Err(if is_repeated { Fault::Repeated } else { fault });
         }
         self.recording.time_s.push(self.values[0]);
         for (joint, pair) in self.recording.joints.iter_mut().zip(self.values[1..].chunks_exact(2)) {
@@ -154,14 +183,18 @@ impl<'a> Decoder<'a> {
     pub(crate) fn finish(mut self, format: String, header: bool) -> Result<Read, FileError> {
         self.settle(None)?;
         let advice = self.time_advice(&self.recording.time_s);
-        let Self { file, columns, recording, numbers, skipped, .. } = self;
-        let rows = recording.time_s.len() + skipped.rows;
-        if skipped.rows * 100 > rows * MOST_BAD_PERCENT {
+        let Self { file, import, columns, mut recording, numbers, skipped, .. } = self;
+        let invalid = skipped.rows - skipped.repeated;
+        let rows = recording.time_s.len() + invalid;
+        if invalid * 100 > rows * MOST_BAD_PERCENT {
             let first = skipped
                 .kinds
                 .first()
                 .map_or(String::new(), |(_, first)| format!("line {}: {}", first.line, first.reason));
-            return Err(refuse(file, None, Fault::TooManyBad { skipped: skipped.rows, rows, first }));
+            return Err(refuse(file, None, Fault::TooManyBad { skipped: invalid, rows, first }));
+        }
+        if import.even_stamps {
+            recording.even_stamps();
         }
         recording.check(&numbers, &advice)?;
         let report = ReadReport {
@@ -214,12 +247,15 @@ fn other_time_unit(time_s: &[f64], import: &Import, mut readings: Vec<Reading>) 
 #[derive(Default)]
 struct Skipped {
     rows: usize,
+    /// Rows among them that repeat another.
+    repeated: usize,
     kinds: Vec<(Discriminant<Fault>, SkippedReport)>,
 }
 
 impl Skipped {
     fn add(&mut self, line: usize, fault: &Fault) {
         self.rows += 1;
+        self.repeated += usize::from(matches!(fault, Fault::Repeated));
         let kind = discriminant(fault);
         match self.kinds.iter_mut().find(|(other, _)| *other == kind) {
             Some((_, why)) => why.rows += 1,
@@ -259,9 +295,10 @@ pub(crate) fn csv(
         let reason = "UTF-16 text: save the file as UTF-8".to_owned();
         return Err(refuse(file, None, Fault::Unreadable(reason)));
     }
-    let dialect = Dialect::detect(&begin, (import.delimiter, import.decimal))
-        .map_err(|fault| refuse(file, None, fault))?;
+    let first_rows = first_rows(&begin);
     drop(begin);
+    let dialect = Dialect::detect(&first_rows, (import.delimiter, import.decimal))
+        .map_err(|fault| refuse(file, None, fault))?;
     let mut rows = Rows::new(source, dialect.delimiter);
     let first = match rows.next() {
         Ok(Some(row)) => row.clone(),
@@ -278,6 +315,19 @@ pub(crate) fn csv(
     let number = |row: &StringRecord, chosen: &Chosen| {
         chosen.column.parsed(row.get(chosen.column.index).unwrap_or(""), dialect.decimal)
     };
+    if import.merge_rows {
+        let first = (!names.are_stated).then_some(&first);
+        let joined = joined(&mut rows, first, &decoder.columns, dialect.decimal)
+            .map_err(|(line, fault)| refuse(file, Some(line), fault))?;
+        for (line, values) in joined {
+            let mut values = values.into_iter();
+            decoder.take(line, |chosen| chosen.column.finite(values.next().unwrap_or(f64::NAN)))?;
+        }
+        return decoder
+            .finish(format!("{}{packing}, rows joined by time", dialect.words()), names.are_stated);
+    }
+    check_scattered(&first_rows, dialect, names.are_stated, &decoder.columns)
+        .map_err(|fault| refuse(file, None, fault))?;
     if !names.are_stated {
         decoder.take(rows.line(), |chosen| number(&first, chosen))?;
     }

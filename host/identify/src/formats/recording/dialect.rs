@@ -1,11 +1,12 @@
 //! Delimiter and decimal sign of a CSV file, found from its first lines.
 //!
-//! A delimiter must split the header and every looked-at row into equally many fields. A decimal comma needs
+//! A delimiter must split the header and every looked-at row into equally many fields; runs of spaces count
+//! where no other does. A decimal comma needs
 //! another delimiter than the comma, and numbers that are not all possible thousands. What remains ambiguous
 //! is refused: `--delimiter` and `--decimal` settle it.
 
 use crate::formats::recording::fault::Fault;
-use crate::formats::recording::lines::is_skipped;
+use crate::formats::recording::lines::{is_skipped, single_spaced};
 
 /// Bytes looked at.
 pub(crate) const LOOKED_AT: usize = 1 << 16;
@@ -18,16 +19,20 @@ pub enum Delimiter {
     Comma,
     Semicolon,
     Tab,
+    /// Any number of spaces.
+    Space,
 }
 
 impl Delimiter {
-    const ALL: [Self; 3] = [Self::Comma, Self::Semicolon, Self::Tab];
+    /// Delimiters that no field contains.
+    const CERTAIN: [Self; 3] = [Self::Comma, Self::Semicolon, Self::Tab];
 
     pub(crate) fn byte(self) -> u8 {
         match self {
             Self::Comma => b',',
             Self::Semicolon => b';',
             Self::Tab => b'\t',
+            Self::Space => b' ',
         }
     }
 
@@ -37,6 +42,7 @@ impl Delimiter {
             Self::Comma => "comma",
             Self::Semicolon => "semicolon",
             Self::Tab => "tab",
+            Self::Space => "space",
         }
     }
 }
@@ -67,27 +73,19 @@ pub(crate) struct Dialect {
 }
 
 impl Dialect {
-    /// Finds what is not `stated` from the first bytes of a file.
+    /// Finds what is not `stated` from the first rows of a file.
     ///
     /// # Errors
     /// The first rows allow two readings.
-    pub(crate) fn detect(begin: &[u8], stated: (Option<Delimiter>, Option<Decimal>)) -> Result<Self, Fault> {
-        let text = String::from_utf8_lossy(begin);
-        let mut lines: Vec<&str> =
-            text.split_inclusive('\n').filter(|line| !is_skipped(line.as_bytes())).collect();
-        if begin.len() >= LOOKED_AT && lines.len() > 1 {
-            lines.pop();
-        }
-        lines.truncate(ROWS);
-        let text = lines.concat();
+    pub(crate) fn detect(text: &str, stated: (Option<Delimiter>, Option<Decimal>)) -> Result<Self, Fault> {
         let delimiter = match stated.0 {
             Some(delimiter) => delimiter,
-            None => delimiter(&text)?,
+            None => delimiter(text)?,
         };
         let decimal = match stated.1 {
             Some(decimal) => decimal,
             None if delimiter == Delimiter::Comma => Decimal::Point,
-            None => decimal(&split(&text, delimiter))?,
+            None => decimal(&split(text, delimiter))?,
         };
         Ok(Self { delimiter, decimal })
     }
@@ -98,24 +96,41 @@ impl Dialect {
             Delimiter::Comma => "commas",
             Delimiter::Semicolon => "semicolons",
             Delimiter::Tab => "tabs",
+            Delimiter::Space => "spaces",
         };
         let decimal = if self.decimal == Decimal::Comma { ", decimal commas" } else { "" };
         format!("CSV with {delimiter}{decimal}")
     }
 }
 
-fn split(text: &str, delimiter: Delimiter) -> Vec<csv::StringRecord> {
+pub(crate) fn split(text: &str, delimiter: Delimiter) -> Vec<csv::StringRecord> {
+    let bytes: Vec<u8> = match delimiter {
+        Delimiter::Space => text.lines().flat_map(|line| single_spaced(line.as_bytes())).collect(),
+        _ => text.as_bytes().to_vec(),
+    };
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
         .trim(csv::Trim::All)
         .delimiter(delimiter.byte())
-        .from_reader(text.as_bytes());
+        .from_reader(&bytes[..]);
     reader.records().map_while(Result::ok).collect()
 }
 
+/// First rows of a file from its first bytes.
+pub(crate) fn first_rows(begin: &[u8]) -> String {
+    let text = String::from_utf8_lossy(begin);
+    let mut lines: Vec<&str> =
+        text.split_inclusive('\n').filter(|line| !is_skipped(line.as_bytes())).collect();
+    if begin.len() >= LOOKED_AT && lines.len() > 1 {
+        lines.pop();
+    }
+    lines.truncate(ROWS);
+    lines.concat()
+}
+
 fn delimiter(text: &str) -> Result<Delimiter, Fault> {
-    let splits = Delimiter::ALL.map(|delimiter| (delimiter, split(text, delimiter)));
+    let splits = Delimiter::CERTAIN.map(|delimiter| (delimiter, split(text, delimiter)));
     let is_even = |rows: &[csv::StringRecord]| {
         rows.first().is_some_and(|first| first.len() > 1 && rows.iter().all(|row| row.len() == first.len()))
     };
@@ -126,6 +141,7 @@ fn delimiter(text: &str) -> Result<Delimiter, Fault> {
         })
     };
     match even[..] {
+        [] if is_even(&split(text, Delimiter::Space)) => Ok(Delimiter::Space),
         [] => {
             // A damaged file: the delimiter of its first line, for the messages about the other lines.
             let fields = |(_, rows): &&(Delimiter, Vec<csv::StringRecord>)| {

@@ -60,6 +60,22 @@ pub(crate) enum Fault {
         /// Second signal.
         other: Signal,
     },
+    /// A file with times has no use for a rate.
+    #[error(
+        "the file has the column of time `{0}`: leave out --rate, or let an even clock replace it (--even-stamps)"
+    )]
+    RateAndTime(String),
+    /// No row holds all signals.
+    #[error(
+        "angles and torques are in different rows: none of the first {rows} has all of {columns}; --merge-rows joins \
+         them by time"
+    )]
+    Scattered {
+        /// Rows looked at.
+        rows: usize,
+        /// Names of the columns.
+        columns: String,
+    },
     /// The name of a column states another unit than the one in use.
     #[error("column `{column}` is in {named} by its name or type, but {signal} is read in {used}{advice}")]
     OtherUnit {
@@ -161,15 +177,24 @@ pub(crate) enum Fault {
     #[error("the torque of this state exceeds the range of double precision")]
     OutOfRange,
     /// Time does not increase.
-    #[error("time {} s does not exceed the previous {} s", Short(*.time), Short(*.previous))]
+    #[error(
+        "time {} s does not exceed the previous {} s{}", Short(*.time), Short(*.previous),
+        if .time == .previous { "; if the times are rounded, --even-stamps replaces them" } else { "" }
+    )]
     TimeNotIncreasing {
         /// Previous stamp.
         previous: f64,
         /// Stamp of this line.
         time: f64,
     },
+    /// A row is written twice.
+    #[error("the row repeats the one before it; --skip-bad keeps one of repeated rows")]
+    Repeated,
     /// Samples are missing.
-    #[error("{gap:.3} s without a sample before this line; at most {limit:.3} s are bridged")]
+    #[error(
+        "{gap:.3} s without a sample before this line; at most {limit:.3} s are bridged: cut the file before this line and \
+         give both parts"
+    )]
     Gap {
         /// Duration of the gap, s.
         gap: f64,
@@ -222,6 +247,7 @@ impl Fault {
                 | Self::NotFinite { .. }
                 | Self::Absurd { .. }
                 | Self::TimeNotIncreasing { .. }
+                | Self::Repeated
         )
     }
 

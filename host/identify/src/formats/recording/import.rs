@@ -12,8 +12,10 @@ use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use crate::formats::leg_file::{BodySide, LegFile, Side};
+use crate::formats::recording::decode::LARGEST_RATE_HZ;
 use crate::formats::recording::dialect::{Decimal, Delimiter};
 use crate::formats::recording::signal::{Quantity, Signal, Unit};
+use crate::formats::recording::suggest::required;
 
 /// Column as a user names it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -100,6 +102,12 @@ pub struct Import {
     pub delimiter: Option<Delimiter>,
     pub decimal: Option<Decimal>,
     pub skip_bad: bool,
+    /// Rate of the rows of a file without a column of time, Hz.
+    pub rate_hz: Option<f64>,
+    /// Whether an even clock replaces the time stamps, which may then repeat.
+    pub even_stamps: bool,
+    /// Whether rows that hold some of the signals each are joined by time.
+    pub merge_rows: bool,
     /// Drives of the joints to read, proximal first.
     pub drives: Vec<Drive>,
     /// Command line without `--columns` and `--units`, for proposals.
@@ -139,6 +147,12 @@ impl Import {
     /// Signals or units that are stated twice or contradict each other, or joints that the leg lacks.
     pub fn with(mut self, columns: &[ColumnChoice], units: &[UnitChoice]) -> Result<Self, String> {
         let joints = self.drives.len();
+        if self.rate_hz.is_some_and(|rate| !(rate > 0.0 && rate <= LARGEST_RATE_HZ)) {
+            return Err(format!("--rate: must be above 0 and at most {LARGEST_RATE_HZ} Hz"));
+        }
+        if self.rate_hz.is_some() && columns.iter().any(|choice| choice.signal == Signal::Time) {
+            return Err("--rate is for files without a column of time: leave out `t` of --columns".to_owned());
+        }
         let check = |option: &str, signal: Signal| match signal.joint() {
             Some(joint) if joint > joints => Err(format!(
                 "{option} {signal}: the leg has {joints} joint{}",
@@ -181,6 +195,11 @@ impl Import {
             }
         }
         Ok(self)
+    }
+
+    /// Signals that a file must hold, each with those that replace it.
+    pub(crate) fn required(&self) -> impl Iterator<Item = Vec<Signal>> {
+        required(self.drives.len()).skip(usize::from(self.rate_hz.is_some()))
     }
 
     /// Unit in use, and whether the user stated it.

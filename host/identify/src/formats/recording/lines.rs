@@ -22,11 +22,13 @@ pub(crate) struct Lines<R> {
     record: Option<usize>,
     /// Whether the line passed last has no line end.
     is_open: bool,
+    /// Whether runs of spaces separate the fields: one space of each is passed.
+    is_spaced: bool,
 }
 
 impl<R: BufRead> Lines<R> {
-    pub fn new(source: R) -> Self {
-        Self { source, line: Vec::new(), passed: 0, number: 0, record: None, is_open: false }
+    pub fn new(source: R, is_spaced: bool) -> Self {
+        Self { source, line: Vec::new(), passed: 0, number: 0, record: None, is_open: false, is_spaced }
     }
 
     /// Begins a record: the next line passed is its first.
@@ -67,10 +69,21 @@ impl<R: BufRead> Lines<R> {
             }
             if !is_skipped(&self.line) {
                 self.is_open = !self.line.ends_with(b"\n");
+                if self.is_spaced {
+                    self.line = single_spaced(&self.line);
+                }
                 return Ok(true);
             }
         }
     }
+}
+
+/// Fields of a line that spaces separate, with one space between them.
+pub(crate) fn single_spaced(line: &[u8]) -> Vec<u8> {
+    let fields: Vec<&[u8]> = line.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty()).collect();
+    let mut line = fields.join(&b' ');
+    line.push(b'\n');
+    line
 }
 
 /// Whether the line is blank or a comment.

@@ -20,6 +20,9 @@ const TYPING_ERROR: f64 = 0.75;
 /// Similarity from which the nearest name is offered for a stated one.
 const NEAREST: f64 = 0.5;
 
+/// What to state of a file without times.
+const NO_TIME: &str = "The file has no column of time. If its rows are evenly spaced, state their rate";
+
 /// Words of each quantity.
 const TIME: [&str; 9] =
     ["t", "time", "timestamp", "timestamps", "stamp", "times", "elapsed", "clock", "zeit"];
@@ -163,7 +166,8 @@ pub(crate) fn advice(stated: &Names, import: &Import, certain: &[(Signal, usize)
     let others: Vec<_> =
         complete.map(|(topic, _)| topic.as_str()).filter(|topic| *topic != topics[best]).collect();
     let (mut found, missing) = all.swap_remove(best);
-    if !missing.is_empty() {
+    let has_time = missing[..] != [Signal::Time];
+    if !missing.is_empty() && has_time {
         let missing: Vec<String> = missing.iter().map(ToString::to_string).collect();
         return format!(". No name resembles {}. {}", missing.join(", "), by_number(names.len(), import));
     }
@@ -188,8 +192,13 @@ pub(crate) fn advice(stated: &Names, import: &Import, certain: &[(Signal, usize)
         0 => String::new(),
         _ => format!("\n  (topics with such columns too: {})", others.join(", ")),
     };
+    let (question, rate) = if has_time {
+        ("If these columns are meant, repeat the command with them", "")
+    } else {
+        (NO_TIME, " --rate HZ")
+    };
     format!(
-        ". If these columns are meant, repeat the command with them:\n  {} --columns {} --units {}{assumed}{others}",
+        ". {question}:\n  {} --columns {} --units {}{rate}{assumed}{others}",
         import.command,
         quoted(&columns.join(",")),
         units(&found.iter().map(|found| (found.signal, found.unit)).collect::<Vec<_>>()),
@@ -242,7 +251,7 @@ fn proposals(
         });
         close.max_by(|(_, a), (_, b)| likeness(a).total_cmp(&likeness(b))).map(|(index, _)| index)
     };
-    for choices in required(import.drives.len()) {
+    for choices in import.required() {
         let known = certain.iter().find(|(signal, _)| choices.contains(signal));
         let proposed = known.copied().or_else(|| {
             choices.iter().find_map(|&signal| {
@@ -326,7 +335,7 @@ pub(crate) fn readings(import: &Import) -> Vec<Reading> {
         };
         Reading { signal, column, unit }
     };
-    required(import.drives.len()).map(|choices| reading(&choices)).collect()
+    import.required().map(|choices| reading(&choices)).collect()
 }
 
 /// Complete command with these readings.
@@ -366,15 +375,35 @@ pub(crate) fn by_number(columns: usize, import: &Import) -> String {
             "The leg needs {needed} columns, the time and each joint's angle and torque, and the file has {columns}{fewer}"
         );
     }
-    let angles = (1..=joints).map(|joint| format!("q{joint}={}", joint + 1));
-    let torques = (1..=joints).map(|joint| format!("tau{joint}={}", joint + 1 + joints));
-    let numbers: Vec<String> = std::iter::once("t=1".to_owned()).chain(angles).chain(torques).collect();
+    let numbers: Vec<String> = std::iter::once("t=1".to_owned()).chain(numbered(joints, 2)).collect();
     format!(
         "Name the columns by --columns SIGNAL=COLUMN,.. (a name, or a number from 1) and their units by --units, for \
          example, if this is their order:\n  {} --columns {} --units s,rad,Nm",
         import.command,
         numbers.join(",")
     )
+}
+
+/// Example of a command for a file without names; the missing column may be the time's.
+pub(crate) fn without_header(columns: usize, import: &Import) -> String {
+    let joints = import.drives.len();
+    if columns != 2 * joints {
+        return by_number(columns, import);
+    }
+    let numbers: Vec<String> = numbered(joints, 1).collect();
+    format!(
+        "{}. If only the time is missing, and the rows are evenly spaced, state their rate, for example, if this is their \
+         order:\n  {} --columns {} --units rad,Nm --rate HZ",
+        by_number(columns, import),
+        import.command,
+        numbers.join(",")
+    )
+}
+
+/// Angles, then torques, in columns from `first` on.
+fn numbered(joints: usize, first: usize) -> impl Iterator<Item = String> {
+    let angles = (0..joints).map(move |joint| format!("q{}={}", joint + 1, joint + first));
+    angles.chain((0..joints).map(move |joint| format!("tau{}={}", joint + 1, joint + joints + first)))
 }
 
 /// One unit for each quantity, and the exceptions.

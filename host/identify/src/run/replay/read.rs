@@ -27,11 +27,7 @@ fn corrected(
         series.torque_nm.iter_mut().for_each(|torque| *torque /= ratio);
     }
     if options.even_stamps {
-        let (first, step) = (
-            recording.time_s.first().copied().unwrap_or(0.0),
-            recording.duration_s() / (recording.time_s.len().max(2) - 1) as f64,
-        );
-        recording.time_s = (0..recording.time_s.len()).map(|sample| first + step * sample as f64).collect();
+        recording.even_stamps();
     }
     let delays = &options.torque_delay_ms;
     if delays.is_empty() {
