@@ -122,7 +122,10 @@ fn a_damaged_row_is_refused_with_line_and_reason() {
         ("1.0,0.1,-0.2,3,-inf", "`-inf` in column `tau2_Nm` is not finite"),
         ("1e999,0.1,-0.2,3,-4", "`1e999` in column `t_s` is not finite"),
         ("0.9,0.1,-0.2,3,-4", "time 0.9 s does not exceed the previous 0.99 s"),
-        ("0.990,0.1,-0.2,3,-4", "time 0.99 s does not exceed the previous 0.99 s"),
+        (
+            "0.990,0.1,-0.2,3,-5",
+            "time 0.99 s does not exceed the previous 0.99 s; if the times are rounded, --even-stamps replaces them",
+        ),
         ("1.0,8192,-0.2,3,-4", "8192 in column `q1_rad` exceeds 1000: is it in another unit?"),
         ("1.0,0.1,-0.2,3,-4e5", "-400000 in column `tau2_Nm` exceeds 100000: is it in another unit?"),
         ("1.0,1e300,-0.2,3,-4", "1e300 in column `q1_rad` exceeds 1000: is it in another unit?"),
@@ -193,7 +196,8 @@ fn a_gap_is_refused_where_it_ends() {
     rows.drain(100..125);
     assert_eq!(
         refusal(&text(HEADER, &rows)),
-        "walk.csv:102: 0.260 s without a sample before this line; at most 0.200 s are bridged"
+        "walk.csv:102: 0.260 s without a sample before this line; at most 0.200 s are bridged: cut the file before this line \
+         and give both parts"
     );
     // A gap of 20 median steps of 10 ms is accepted.
     rows.insert(100, "1.1,0.1,-0.2,3,-4".to_owned());
