@@ -53,6 +53,16 @@ fn the_unit_of_the_cost_changes_no_bit_of_the_result() {
 }
 
 #[test]
+fn single_precision_follows_a_bent_valley() {
+    // Known: 200 of 200. With whiskers not below the root of the rounding 29 of 200.
+    for seed in 1..=8 {
+        let cost = Instance::new(Shape::BentCigar, 10, true, seed);
+        let found = cost.evaluations(AdaptiveSettings::<f32>::default(), 1e-3, seed).expect("a valid box");
+        assert!(found.is_some(), "seed {seed}");
+    }
+}
+
+#[test]
 fn constant_axes_and_place_of_the_minimum_do_not_matter() {
     for (shape, goal) in SHAPES {
         let plain = median(shape, goal, true, |_| ());

@@ -247,6 +247,15 @@ mod tests {
     }
 
     #[test]
+    fn directions_without_a_reading_do_not_make_the_cost_rippled() {
+        let mut rules = measured();
+        rules.frame.whisker[0].reading = None;
+        rules.frame.whisker[1].reading = None;
+        rules.learn_metric();
+        assert_eq!(rules.convex_share, Some(1.0));
+    }
+
+    #[test]
     fn whiskers_reach_a_fifth_of_the_way_to_the_other_beetles() {
         for (distances, expected) in
             [([-1.0, 0.7, 0.0, 20.0], 0.14), ([-1.0, 0.7, -1.0, -1.0], 0.08), ([-1.0; N], 0.08)]
